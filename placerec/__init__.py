@@ -1,0 +1,108 @@
+"""Place recognition as language modelling: images -> visual words -> n-gram models -> belief over places.
+
+The names below are loaded when they are first used: importing placerec loads neither OpenCV nor scipy.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from placerec.version import __version__
+
+_ROOMS = {
+    "placerec.errors": ("PlacerecError",),
+    "placerec.frames": ("Frame", "Sequence", "find_sequences", "read_gray"),
+    "placerec.vision": ("DescriptorSpec", "Dictionary", "describe", "gist", "train_dictionary"),
+    "placerec.words": ("Selection", "WordStream", "parse_selection", "read_stream", "select", "write_stream"),
+    "placerec.words.tokenize": ("tokenize",),
+    "placerec.lm": ("BackoffModel", "count_ngrams", "estimate", "read_arpa", "smoothing", "write_arpa"),
+    "placerec.lm.checks": ("check_model",),
+    "placerec.lm.inspection": ("inspect_model",),
+    "placerec.hohmm": (
+        "Belief",
+        "Beliefs",
+        "Recognizer",
+        "Transition",
+        "filter_stream",
+        "fixed_transition",
+        "read_beliefs",
+    ),
+    "placerec.model": ("Options", "decode", "load_recognizer", "train_lm"),
+    "placerec.evaluation": ("evaluate", "evaluate_files"),
+    "placerec.lab": ("render_lab",),
+}
+_HOME = {name: room for room, names in _ROOMS.items() for name in names}
+
+if TYPE_CHECKING:
+    from placerec.errors import PlacerecError
+    from placerec.evaluation import evaluate, evaluate_files
+    from placerec.frames import Frame, Sequence, find_sequences, read_gray
+    from placerec.hohmm import (
+        Belief,
+        Beliefs,
+        Recognizer,
+        Transition,
+        filter_stream,
+        fixed_transition,
+        read_beliefs,
+    )
+    from placerec.lab import render_lab
+    from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
+    from placerec.lm.checks import check_model
+    from placerec.lm.inspection import inspect_model
+    from placerec.model import Options, decode, load_recognizer, train_lm
+    from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
+    from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
+    from placerec.words.tokenize import tokenize
+
+__all__ = [
+    "BackoffModel",
+    "Belief",
+    "Beliefs",
+    "DescriptorSpec",
+    "Dictionary",
+    "Frame",
+    "Options",
+    "PlacerecError",
+    "Recognizer",
+    "Selection",
+    "Sequence",
+    "Transition",
+    "WordStream",
+    "__version__",
+    "check_model",
+    "count_ngrams",
+    "decode",
+    "describe",
+    "estimate",
+    "evaluate",
+    "evaluate_files",
+    "filter_stream",
+    "find_sequences",
+    "fixed_transition",
+    "gist",
+    "inspect_model",
+    "load_recognizer",
+    "parse_selection",
+    "read_arpa",
+    "read_beliefs",
+    "read_gray",
+    "read_stream",
+    "render_lab",
+    "select",
+    "smoothing",
+    "tokenize",
+    "train_dictionary",
+    "train_lm",
+    "write_arpa",
+    "write_stream",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'placerec' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

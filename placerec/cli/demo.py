@@ -1,0 +1,23 @@
+"""`placerec demo`."""
+
+from pathlib import Path
+
+import click
+
+from placerec.cli.options import output_option, progress_bar, talk_options
+
+
+@click.command(epilog="Example: placerec demo")
+@output_option(required=False, metavar="demo/", text="The folder to write.  [default: demo/]")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the laboratory and the map."
+)
+@talk_options
+def demo(out: Path | None, seed: int) -> None:
+    """Show all of it on the synthetic laboratory: images, words, models, beliefs, and a page to look at."""
+    from placerec.demo import format_results, run_demo
+
+    out = out or Path("demo")
+    results = run_demo(out, seed=seed, progress=progress_bar)
+    click.echo(format_results(results))
+    click.echo(f"\nNow open {out / 'report.html'}", err=True)

@@ -1,0 +1,75 @@
+"""`placerec train-lm`."""
+
+from pathlib import Path
+
+import click
+
+from placerec.cli.options import PATH, output_option, progress_bar, talk_options
+
+# The names of placerec.lm.SMOOTHINGS, written out: importing it would make --help wait for numpy.
+SMOOTHING_NAMES = ("witten-bell", "witten-bell-backoff", "lidstone", "lidstone-backoff")
+
+
+@click.command("train-lm", epilog="Example: placerec train-lm tokens/seq*[12].tsv -o model/ --order 2")
+@click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH)
+@click.option(
+    "--order", type=click.IntRange(1, 9), default=2, show_default=True, help="n-gram order; 1 is the classical HMM."
+)
+@click.option(
+    "--smoothing",
+    type=click.Choice(SMOOTHING_NAMES),
+    default="witten-bell",
+    show_default=True,
+    help="How unseen n-grams get their probability.",
+)
+@click.option(
+    "--delta",
+    type=click.FloatRange(0, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="What lidstone adds to every count.",
+)
+@click.option(
+    "--select", default="none", show_default=True, metavar="RULE", help="none, unique, subsample:S or compress:M."
+)
+@click.option(
+    "--min-count",
+    default="1",
+    show_default=True,
+    metavar="N[,N...]|srilm",
+    help="Per order, how often an n-gram must occur to be listed.",
+)
+@click.option(
+    "--markers/--no-markers", default=False, show_default=True, help="Whether to count <s> and </s> around visits."
+)
+@click.option(
+    "--vocab",
+    metavar="FILE",
+    type=PATH,
+    default=None,
+    help="All words, one a line.  [default: vocab.txt beside TOKENS]",
+)
+@output_option(metavar="MODEL/", text="The folder to write: one ARPA file per place, and what made it.")
+@talk_options
+def train_lm(
+    tokens: tuple[Path, ...],
+    order: int,
+    smoothing: str,
+    delta: float,
+    select: str,
+    min_count: str,
+    markers: bool,
+    vocab: Path | None,
+    out: Path,
+) -> None:
+    """Train one n-gram language model per place, written as ARPA files.
+
+    TOKENS are token streams (.tsv), folders of them, or one folder of sentences: PLACE.txt, one visit a line.
+    """
+    from placerec.model import Options, parse_min_count
+    from placerec.model import train_lm as run
+    from placerec.words import parse_selection
+
+    options = Options(order, smoothing, delta, parse_min_count(min_count), markers, parse_selection(select))
+    with progress_bar("train-lm") as progress:
+        run(tokens, out, options=options, vocabulary=vocab, progress=progress)

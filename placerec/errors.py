@@ -1,0 +1,47 @@
+"""What can go wrong for a reason that the user can mend: one class per room, one base for the border to catch."""
+
+from pathlib import Path
+
+
+class PlacerecError(Exception):
+    """Base of all errors that placerec raises on purpose; the message is one line: file, line, value, remedy."""
+
+
+class SourceError(PlacerecError):
+    """A sequence, an image or a label file that cannot be used."""
+
+
+class VisionError(PlacerecError):
+    """A descriptor, a dictionary or a words.npz that cannot be used."""
+
+
+class StreamError(PlacerecError):
+    """A token stream, vocabulary or sentence file that cannot be used."""
+
+
+class LanguageModelError(PlacerecError):
+    """Counts, an estimate or an ARPA file that cannot be used."""
+
+
+class ModelError(PlacerecError):
+    """A MODEL/ folder, a transition or a recognizer that cannot be used."""
+
+
+class EvaluationError(PlacerecError):
+    """Beliefs that cannot be judged or drawn."""
+
+
+class OutputError(PlacerecError):
+    """An output that cannot be written."""
+
+
+class MissingExtraError(PlacerecError):
+    """An optional package that the request needs is not installed."""
+
+    def __init__(self, package: str, purpose: str, remedy: str) -> None:
+        super().__init__(f"{purpose} needs the package {package}, which is not installed: {remedy}")
+
+
+def at(path: Path | str, line: int, message: str) -> str:
+    """`message` with the position in front, as compilers print it."""
+    return f"{path}:{line}: {message}"

@@ -1,0 +1,28 @@
+"""Beliefs into knowledge: numbers, pictures and pages."""
+
+from placerec.evaluation.metrics import Evaluation, PlaceScore, SequenceScore, evaluate
+from placerec.evaluation.panels import belief_strip, confusion_panel, figure_file, legend_panel
+from placerec.evaluation.plots import plot_evaluation
+from placerec.evaluation.report import heading, html_page, paragraph, picture, preformatted, table
+from placerec.evaluation.sources import evaluate_files
+from placerec.evaluation.summary import format_evaluation
+
+__all__ = [
+    "Evaluation",
+    "PlaceScore",
+    "SequenceScore",
+    "belief_strip",
+    "confusion_panel",
+    "evaluate",
+    "evaluate_files",
+    "figure_file",
+    "format_evaluation",
+    "heading",
+    "html_page",
+    "legend_panel",
+    "paragraph",
+    "picture",
+    "plot_evaluation",
+    "preformatted",
+    "table",
+]

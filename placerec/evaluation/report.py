@@ -1,0 +1,133 @@
+"""A page to look at: one HTML file that needs no network, no scripts and no second file.
+
+Every function takes plain text, escapes it and gives back HTML; `html_page` puts the pieces together.
+"""
+
+import base64
+import html
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from placerec.errors import EvaluationError
+
+_STYLE = """
+:root { color-scheme: light dark; --ink: #1d1d1f; --soft: #5c5c64; --line: #d4d4da; --shade: #f3f3f6; --page: #fff; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e6e6ea; --soft: #a2a2ac; --line: #3d3d46; --shade: #25252b; --page: #17171a; }
+}
+body { max-width: 76rem; margin: 3rem auto; padding: 0 1.25rem; background: var(--page); color: var(--ink);
+       font: 1.0625rem/1.6 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
+h1, h2, h3 { line-height: 1.25; margin: 2.2em 0 .6em; }
+h1 { font-size: 2rem; margin-top: 0; }
+h2 { font-size: 1.35rem; border-top: 1px solid var(--line); padding-top: 1.1em; }
+h3 { font-size: 1.1rem; }
+p { max-width: 44rem; }
+figure { margin: 1.8rem 0; overflow-x: auto; }
+figure img { max-width: 100%; height: auto; background: #fff; border-radius: 4px; }
+figcaption, caption { color: var(--soft); font-size: .9rem; text-align: left; padding: .5rem 0; max-width: 44rem; }
+table { border-collapse: collapse; font-size: .95rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .3rem .9rem .3rem 0; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
+th { font-weight: 600; }
+.number { text-align: right; }
+pre { background: var(--shade); border-radius: 4px; padding: .8rem 1rem; overflow-x: auto; font-size: .9rem;
+      line-height: 1.5; font-family: ui-monospace, "SF Mono", Menlo, Consolas, "DejaVu Sans Mono", monospace; }
+@media print { body { margin: 0; max-width: none; } figure, table { break-inside: avoid; } }
+""".strip()
+
+# The browser itself then refuses whatever would leave the file.
+_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+
+_KINDS = ((b"\x89PNG\r\n\x1a\n", "image/png"), (b"\xff\xd8\xff", "image/jpeg"))
+
+
+def html_page(title: str, body: Iterable[str]) -> str:
+    """A whole page: `title` as text, `body` as pieces of HTML from the functions below."""
+    name = html.escape(title)
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en">',
+            "<head>",
+            '<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{name}</title>",
+            f"<style>\n{_STYLE}\n</style>",
+            "</head>",
+            "<body>",
+            f"<h1>{name}</h1>",
+            *body,
+            "</body>",
+            "</html>",
+            "",
+        ]
+    )
+
+
+def heading(text: str, level: int = 2) -> str:
+    """A heading; the page's title is level 1."""
+    return f"<h{level}>{html.escape(text)}</h{level}>"
+
+
+def paragraph(text: str) -> str:
+    """A paragraph of plain text."""
+    return f"<p>{html.escape(text)}</p>"
+
+
+def preformatted(text: str) -> str:
+    """Commands or a program's output, line by line as they are."""
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+def picture(image: Path | str | bytes, alt: str, caption: str) -> str:
+    """A PNG, JPEG or SVG picture, kept inside the page; `alt` is what someone who cannot see it is told.
+
+    image: a file or its bytes. Raises EvaluationError if the file cannot be read or holds no such picture.
+    """
+    source = "the picture" if isinstance(image, bytes) else str(image)
+    try:
+        data = image if isinstance(image, bytes) else Path(image).read_bytes()
+    except OSError as error:
+        raise EvaluationError(f"{source}: cannot be read: {error.strerror}") from error
+    encoded = base64.b64encode(data).decode("ascii")
+    return (
+        f'<figure><img src="data:{_kind(data, source)};base64,{encoded}" alt="{html.escape(alt)}">\n'
+        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
+    )
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[object]], caption: str) -> str:
+    """A table of texts and numbers; None is a dash, and columns without texts are set flush right.
+
+    Numbers are written by `str`: whoever knows their unit rounds them. Raises ValueError if a row has another length
+    than `header`.
+    """
+    body = [tuple(row) for row in rows]
+    flush = [all(_numeric(row[column]) for row in body) for column in range(len(header))] if body else []
+    lines = ["<figure><table>", f"<caption>{html.escape(caption)}</caption>"]
+    lines.append(f"<thead>{_row(header, flush or [False] * len(header), 'th')}</thead>")
+    lines += ["<tbody>", *(_row(row, flush, "td") for row in body), "</tbody>", "</table></figure>"]
+    return "\n".join(lines)
+
+
+def _row(cells: Sequence[object], flush: Sequence[bool], tag: str) -> str:
+    kind = f'{tag} scope="col"' if tag == "th" else tag
+    texts = []
+    for cell, right in zip(cells, flush, strict=True):
+        text = "–" if cell is None else html.escape(str(cell))
+        texts.append(f'<{kind} class="number">{text}</{tag}>' if right else f"<{kind}>{text}</{tag}>")
+    return f"<tr>{''.join(texts)}</tr>"
+
+
+def _numeric(cell: object) -> bool:
+    """Also `87.3 %` and `12 ms`: what starts like a number is compared like one."""
+    return cell is None or isinstance(cell, int | float) or str(cell).lstrip("+-−±~<> ")[:1].isdigit()
+
+
+def _kind(data: bytes, source: str) -> str:
+    for magic, kind in _KINDS:
+        if data.startswith(magic):
+            return kind
+    if b"<svg" in data[:1000]:
+        return "image/svg+xml"
+    raise EvaluationError(f"{source}: neither PNG, JPEG nor SVG; pages hold no other pictures")

@@ -1,0 +1,7 @@
+"""Where images come from: folders are found, labelled and put in order; images are decoded one at a time."""
+
+from placerec.frames.find import find_sequences
+from placerec.frames.image import read_gray
+from placerec.frames.sequence import Frame, Sequence
+
+__all__ = ["Frame", "Sequence", "find_sequences", "read_gray"]

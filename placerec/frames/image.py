@@ -1,0 +1,150 @@
+"""One image file -> grey levels. Damage is looked for before decoding: OpenCV gives half a picture and no error."""
+
+import re
+import struct
+import threading
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import SourceError
+
+# cv2 is imported where it is used: listing frames must not cost its import.
+
+MIN_SIDE = 8
+_REMEDY = "copy it again or remove it"
+_JPEG = b"\xff\xd8\xff"
+_PNG = b"\x89PNG\r\n\x1a\n"
+# Within a scan FF is followed by 00 (a stuffed byte), D0-D7 (a restart) or FF (filling); anything else ends it.
+_SCAN_END = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
+_DEPTHS = (8, 10, 12, 14, 16)
+
+
+def read_gray(path: Path) -> NDArray[np.uint8] | NDArray[np.float32]:
+    """The grey levels 0..255 of an image file, (h, w): uint8, or float32 for a file of 16 bits a channel.
+
+    OpenCV's grey decoding is the one path (its luma differs by up to 11 levels from a conversion of the decoded
+    colours); alpha and colour profiles are ignored, EXIF orientation is applied. 16 bits: the depth in use is the
+    least of 8, 10, 12, 14, 16 bits that holds the brightest pixel, and its top becomes 255 (full 16 bits: value / 257).
+    Raises SourceError naming the file and the reason: missing, empty, truncated, damaged, no image, pixels of another
+    type, a side below 8 pixels.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        raise SourceError(f"{path}: no such file") from error
+    except OSError as error:
+        raise SourceError(f"{path}: cannot be read: {error.strerror}") from error
+    if not data:
+        raise SourceError(f"{path}: is empty; {_REMEDY}")
+    if data.startswith(_JPEG):
+        _check_jpeg(path, data)
+    elif data.startswith(_PNG):
+        data = _plain_png(path, data)
+    pixels = _decode(path, data)
+    height, width = pixels.shape[:2]
+    if min(height, width) < MIN_SIDE:
+        raise SourceError(f"{path}: is {width}x{height} pixels, and {MIN_SIDE} a side are needed; remove it")
+    if pixels.dtype == np.uint16:
+        return _stretch(pixels)
+    if pixels.dtype != np.uint8:
+        raise SourceError(f"{path}: has pixels of type {pixels.dtype}; save it with 8 or 16 bits a channel")
+    return pixels
+
+
+def _decode(path: Path, data: bytes) -> NDArray[Any]:
+    import cv2
+
+    # ANYDEPTH: without it 16 bits are cut to the upper 8, which leaves 12-bit cameras a black picture.
+    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
+    try:
+        with _quiet():
+            pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error as error:
+        raise SourceError(f"{path}: OpenCV refuses it ({' '.join(error.err.split())}); {_REMEDY}") from error
+    if pixels is None:
+        raise SourceError(f"{path}: is no image that OpenCV can decode; {_REMEDY}")
+    return pixels
+
+
+def _stretch(pixels: NDArray[np.uint16]) -> NDArray[np.float32]:
+    peak = int(pixels.max())
+    depth = next(bits for bits in _DEPTHS if peak < 1 << bits)
+    return pixels * np.float32(255 / ((1 << depth) - 1))
+
+
+def _check_jpeg(path: Path, data: bytes) -> None:
+    """Raise SourceError if the end marker cannot be reached; what follows it (padding, a picture) is no concern.
+
+    The segments are walked, for a thumbnail within one has an end marker of its own.
+    """
+    place = 2
+    while place + 4 <= len(data) and data[place] == 0xFF:
+        marker = data[place + 1]
+        if marker == 0xD9:
+            return
+        if marker == 0xFF:
+            place += 1
+            continue
+        place += 2 + struct.unpack_from(">H", data, place + 2)[0]
+        if marker == 0xDA:
+            end = _SCAN_END.search(data, place)
+            place = end.start() if end else len(data)
+    if data[place : place + 2] != b"\xff\xd9":
+        raise SourceError(f"{path}: JPEG is truncated or damaged (no end marker); {_REMEDY}")
+
+
+def _plain_png(path: Path, data: bytes) -> bytes:
+    """The same picture without colour profile and comments; SourceError if it is truncated or a checksum is wrong.
+
+    With a gamma or sRGB tag libpng weighs the colours otherwise (up to 65 grey levels), and it writes to stderr about
+    tags that it dislikes: tags other than the orientation are not handed to it.
+    """
+    kept = [_PNG]
+    place = len(_PNG)
+    while place + 12 <= len(data):
+        length, kind = struct.unpack_from(">I4s", data, place)
+        end = place + 12 + length
+        if end > len(data):
+            break
+        if kind == b"eXIf" or not kind[0] & 0x20:
+            if zlib.crc32(data[place + 4 : end - 4]) != int.from_bytes(data[end - 4 : end], "big"):
+                raise SourceError(f"{path}: PNG is damaged (checksum of {kind.decode('latin-1')}); {_REMEDY}")
+            kept.append(data[place:end])
+        if kind == b"IEND":
+            return b"".join(kept)
+        place = end
+    raise SourceError(f"{path}: PNG is truncated (no IEND); {_REMEDY}")
+
+
+_lock = threading.Lock()
+_decoding = 0
+_level = 0
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """OpenCV's log is silent within: the error that is raised says what it would say, and names the file.
+
+    The level is one for the process: the first thread to enter keeps it, the last to leave restores it.
+    """
+    global _decoding, _level
+    from cv2.utils import logging as cv2_log
+
+    with _lock:
+        if _decoding == 0:
+            _level = cv2_log.setLogLevel(cv2_log.LOG_LEVEL_SILENT)
+        _decoding += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _decoding -= 1
+            if _decoding == 0:
+                cv2_log.setLogLevel(_level)

@@ -1,0 +1,90 @@
+"""Names of places, and places.lst, which gives them to images.
+
+Grammar of places.lst (COLD, readings 4.1): one line per image, `<file name> <label>`, split at the last white space.
+UTF-8 with or without a byte order mark; LF or CRLF; lines in any order; blank lines mean nothing.
+"""
+
+import unicodedata
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from placerec.errors import SourceError, at
+from placerec.files import read_text
+
+# The columns of the token and belief files, which stand beside the places there.
+COLUMNS = frozenset({"frame", "time", "place", "word", "distance", "selected", "best", "unknown"})
+
+
+@dataclass(frozen=True)
+class PlaceList:
+    """A places.lst: image name -> place, and image name -> the line (from 1) that says so."""
+
+    path: Path
+    places: dict[str, str]
+    lines: dict[str, int]
+
+
+def check_place(name: str) -> str | None:
+    """Why `name` cannot be a place's name (a place is a file name and a column header), or None if it can."""
+    if not name:
+        return "is empty"
+    if name.startswith("."):
+        return "starts with a dot"
+    if name in COLUMNS:
+        return "is the name of a column in placerec's files"
+    for character in name:
+        if character in "/\\":
+            return f"holds a {character}"
+        if character.isspace():
+            return "holds white space"
+        if not character.isprintable():
+            return f"holds the control character U+{ord(character):04X}"
+    return None
+
+
+def check_twins(places: Iterable[tuple[str, str]]) -> None:
+    """Raise SourceError if two places differ in case alone; `places` are pairs of a name and where it stands.
+
+    Their files (PLACE.arpa) would be one file where the file system ignores case.
+    """
+    seen: dict[str, tuple[str, str]] = {}
+    for name, where in places:
+        twin, position = seen.setdefault(unicodedata.normalize("NFC", name).casefold(), (name, where))
+        if twin != name:
+            raise SourceError(f"{where}: place {name!r} differs only in case from {twin!r} ({position}); rename one")
+
+
+def read_places(path: Path, images: Collection[str] = ()) -> PlaceList:
+    """The labels in a places.lst; `images` are the sequence's file names, by which labels with spaces are caught.
+
+    Raises SourceError naming file and line: no label, a name that cannot be a place's, two labels for one image.
+    """
+    places: dict[str, str] = {}
+    lines: dict[str, int] = {}
+    # Not splitlines(): it would also split at form feeds and the like, and the line numbers would be wrong.
+    for number, line in enumerate(read_text(path, SourceError).removeprefix("\ufeff").split("\n"), start=1):
+        if not line.strip():
+            continue
+        image, place = _split(path, number, line.strip(), images)
+        if reason := check_place(place):
+            raise SourceError(at(path, number, f"place {place!r} {reason}; rename it"))
+        if places.setdefault(image, place) != place:
+            message = (
+                f"{image} is labelled {place}, but {places[image]} in line {lines[image]}; remove one of the lines"
+            )
+            raise SourceError(at(path, number, message))
+        lines.setdefault(image, number)
+    return PlaceList(path, places, lines)
+
+
+def _split(path: Path, number: int, line: str, images: Collection[str]) -> tuple[str, str]:
+    fields = line.rsplit(maxsplit=1)
+    if len(fields) < 2 or line in images:
+        raise SourceError(at(path, number, f"no label in {line!r}; a line is '<file name> <label>'"))
+    image, place = fields
+    if image not in images:
+        first, rest = line.split(maxsplit=1)
+        if first in images:
+            raise SourceError(at(path, number, f"place {rest!r} holds white space; rename it"))
+    return image, place

@@ -1,0 +1,20 @@
+"""Words and language models -> belief over places: the Bayesian filter of eq. 1."""
+
+from placerec.hohmm.beliefs import Beliefs, format_header, format_row, read_beliefs, write_beliefs
+from placerec.hohmm.filter import Filtered, filter_stream
+from placerec.hohmm.recognizer import Belief, Recognizer
+from placerec.hohmm.transitions import Transition, fixed_transition
+
+__all__ = [
+    "Belief",
+    "Beliefs",
+    "Filtered",
+    "Recognizer",
+    "Transition",
+    "filter_stream",
+    "fixed_transition",
+    "format_header",
+    "format_row",
+    "read_beliefs",
+    "write_beliefs",
+]

@@ -1,0 +1,193 @@
+"""Beliefs as text: one tab-separated line per frame, the same for a file and for a stream.
+
+    frame  time  place  word  selected  best  PLACE...  [unknown]
+
+`time` in seconds, empty where unknown; `place` the true one, empty where unlabelled; `selected` 1 or 0; one column per
+place with its belief. The places' columns sum to 1; a last column `unknown` stands beside them and is not a place.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import EvaluationError, OutputError, at
+from placerec.files import read_text, write_text
+
+COLUMNS = ("frame", "time", "place", "word", "selected", "best")
+UNKNOWN = "unknown"
+
+# A file of rounded numbers may miss 1 by a little; a row that misses it by more is no distribution.
+_SUM_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """What was believed about every frame of one sequence; n frames, C places."""
+
+    name: str  # the sequence
+    places: tuple[str, ...]  # C columns
+    frames: tuple[str, ...]  # n
+    times: NDArray[np.float64]  # (n,) seconds, nan where unknown
+    truth: tuple[str, ...]  # n, "" where unlabelled
+    words: tuple[str, ...]  # n
+    selected: NDArray[np.bool_]  # (n,)
+    best: tuple[str, ...]  # n
+    belief: NDArray[np.float64]  # (n, C), rows sum to 1
+
+
+def format_header(places: Iterable[str]) -> str:
+    """The header line for these places, without its line end; raises OutputError for a name that cannot be a column."""
+    return _line((*COLUMNS, *places))
+
+
+def format_row(
+    frame: str, time: float, place: str, word: str, selected: bool, best: str, belief: Iterable[float]
+) -> str:
+    """One frame's line, without its line end.
+
+    time: seconds, nan where unknown, written to the microsecond; belief: C probabilities, written with nine
+    significant digits. Raises OutputError for a text that holds a tab or a line end.
+    """
+    # Not repr: frames are often stamped in epoch seconds, where anything after the microsecond is noise.
+    seconds = "" if math.isnan(time) else np.format_float_positional(time, precision=6, trim="-")
+    return _line((frame, seconds, place, word, "1" if selected else "0", best, *(f"{p:.9g}" for p in belief)))
+
+
+def write_beliefs(path: Path | str, beliefs: Beliefs) -> None:
+    """Write one sequence's beliefs, gzipped if `path` ends in .gz; raises OutputError if that cannot be done."""
+    rows = zip(
+        beliefs.frames,
+        beliefs.times.tolist(),
+        beliefs.truth,
+        beliefs.words,
+        beliefs.selected.tolist(),
+        beliefs.best,
+        beliefs.belief.tolist(),
+        strict=True,
+    )
+    lines = [format_header(beliefs.places), *(format_row(*row) for row in rows)]
+    write_text(Path(path), "\n".join(lines) + "\n")
+
+
+def read_beliefs(path: Path | str) -> Beliefs:
+    """Read one sequence's beliefs; its name is the file's without .tsv and .gz.
+
+    Raises EvaluationError for a file that cannot be read or is not a beliefs file.
+    """
+    path = Path(path)
+    return parse_beliefs(
+        read_text(path, EvaluationError), name=path.name.removesuffix(".gz").removesuffix(".tsv"), source=path
+    )
+
+
+def parse_beliefs(text: str, *, name: str, source: Path | str) -> Beliefs:
+    """The beliefs in a file's text; `source` is what error messages call it.
+
+    Raises EvaluationError with the line, the value and the remedy if the text is not a beliefs file.
+    """
+    # Not splitlines: a frame may be named with one of the dozen characters that Unicode counts as line ends.
+    lines = text.removeprefix("\ufeff").replace("\r\n", "\n").removesuffix("\n").split("\n")
+    if lines == [""]:
+        raise EvaluationError(f"{source}: is empty; a beliefs file starts with a header: {' '.join(COLUMNS)} PLACE...")
+    header = lines[0].split("\t")
+    places = _places(header, source)
+    known = frozenset(places)
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        try:
+            rows.append(_row(line.split("\t"), header, places, known))
+        except ValueError as error:
+            raise EvaluationError(at(source, number, str(error))) from None
+    return Beliefs(
+        name=name,
+        places=places,
+        frames=tuple(row.frame for row in rows),
+        times=np.array([row.time for row in rows], dtype=np.float64),
+        truth=tuple(row.place for row in rows),
+        words=tuple(row.word for row in rows),
+        selected=np.array([row.selected for row in rows], dtype=np.bool_),
+        best=tuple(row.best for row in rows),
+        belief=np.array([row.belief for row in rows], dtype=np.float64).reshape(len(rows), len(places)),
+    )
+
+
+class _Row(NamedTuple):
+    frame: str
+    time: float
+    place: str
+    word: str
+    selected: bool
+    best: str
+    belief: list[float]
+
+
+def _line(fields: Iterable[str]) -> str:
+    fields = tuple(fields)
+    for field in fields:
+        if "\t" in field or "\n" in field or "\r" in field:
+            raise OutputError(f"{field!r} holds a tab or a line end, which a beliefs file cannot hold; rename it")
+    return "\t".join(fields)
+
+
+def _places(header: list[str], source: Path | str) -> tuple[str, ...]:
+    missing = [column for column in COLUMNS if column not in header]
+    if missing:
+        remedy = "write it with `placerec decode`"
+        raise EvaluationError(at(source, 1, f"not a beliefs file: no column {', '.join(missing)}; {remedy}"))
+    if tuple(header[: len(COLUMNS)]) != COLUMNS:
+        found, wanted = " ".join(header[: len(COLUMNS)]), " ".join(COLUMNS)
+        raise EvaluationError(at(source, 1, f"the header begins {found!r}; the order is {wanted!r}"))
+    places = header[len(COLUMNS) :]
+    if places and places[-1] == UNKNOWN:
+        places = places[:-1]
+    if not places:
+        raise EvaluationError(at(source, 1, f"no column for a place after {COLUMNS[-1]!r}; one per place is needed"))
+    for index, place in enumerate(places):
+        if place in places[:index] or place in (*COLUMNS, UNKNOWN, ""):
+            raise EvaluationError(at(source, 1, f"{place!r} cannot be the name of one more place; rename that column"))
+    return tuple(places)
+
+
+def _row(fields: list[str], header: list[str], places: tuple[str, ...], known: frozenset[str]) -> _Row:
+    if len(fields) != len(header):
+        raise ValueError(f"the line has {len(fields)} of the header's {len(header)} fields; mend or remove it")
+    frame, time, place, word, selected, best = fields[: len(COLUMNS)]
+    if selected not in ("0", "1"):
+        raise ValueError(f"selected is {selected!r}; it is 1 or 0")
+    if best not in known:
+        raise ValueError(f"best is {best!r}, which is no place of the header; the places are {', '.join(places)}")
+    cells = fields[len(COLUMNS) :]
+    belief = [_probability(cell, column) for cell, column in zip(cells, header[len(COLUMNS) :], strict=True)]
+    belief = belief[: len(places)]
+    if abs(math.fsum(belief) - 1) > _SUM_TOLERANCE:
+        raise ValueError(f"the beliefs sum to {math.fsum(belief):.6g}, not to 1; decode the sequence again")
+    return _Row(frame, _seconds(time), place, word, selected == "1", best, belief)
+
+
+def _seconds(text: str) -> float:
+    if not text:
+        return math.nan
+    seconds = _number(text)
+    if not math.isfinite(seconds):
+        raise ValueError(f"time is {text!r}, not a number of seconds; leave it empty where it is unknown")
+    return seconds
+
+
+def _probability(text: str, column: str) -> float:
+    value = _number(text)
+    if not 0 <= value <= 1:
+        raise ValueError(f"the belief in {column} is {text!r}, not a number from 0 to 1; decode the sequence again")
+    return value
+
+
+def _number(text: str) -> float:
+    """The number, nan for any other text: whoever asks names the column."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

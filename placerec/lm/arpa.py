@@ -1,0 +1,257 @@
+r"""ARPA files: the text form of a back-off model that SRILM, KenLM and most decoders read.
+
+Grammar (one blank between words, tabs elsewhere; numbers are log10, `%.7g`)::
+
+    file     = { "#" text NL } NL "\data\" NL { "ngram " n "=" count NL } section { section } NL "\end\" NL
+    section  = NL "\" n "-grams:" NL { log10-p TAB word { " " word } [ TAB log10-backoff ] NL }
+
+The writer's layout and order of lines are SRILM's (section 7 of our specification). The reader is as strict as
+KenLM's, so that a file that passes here passes there; orders that KenLM does not do are read as well. -99 stands for
+log 0.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from placerec.errors import LanguageModelError, at
+from placerec.files import read_text, write_text
+from placerec.lm.backoff import BackoffModel, Singles, score_ids
+from placerec.lm.trie import Ints, Trie, Vocabulary
+
+LOG_ZERO = -99.0
+
+
+def format_arpa(model: BackoffModel, comment: str = "") -> str:
+    """The ARPA text of `model`, with a first line `# comment` if one is given."""
+    lines = [f"# {comment}\n"] if comment else []
+    lines.append("\n\\data\\\n")
+    lines += [f"ngram {n}={len(keys)}\n" for n, keys in enumerate(model.trie.keys, start=1)]
+    contexts = np.zeros(1, np.int64)
+    for n, ranks in enumerate(model.trie.context_ranks(), start=1):
+        lines.append(f"\n\\{n}-grams:\n")
+        prefix = model.trie.prefix(n) if n > 1 else np.zeros(len(model.words), np.int64)
+        by_context = np.lexsort((model.trie.word(n), contexts[prefix]))
+        lines += _section(model, n, by_context)
+        contexts = ranks
+    lines.append("\n\\end\\\n")
+    return "".join(lines)
+
+
+def _section(model: BackoffModel, n: int, rows: Ints) -> Iterator[str]:
+    log10_p = np.nan_to_num(model.log10_ps[n - 1].astype(np.float64), neginf=LOG_ZERO)
+    backoff = np.nan_to_num(model.backoffs[n - 1].astype(np.float64), nan=np.inf, neginf=LOG_ZERO, posinf=np.inf)
+    texts = model.trie.texts(n)
+    for row, p, weight in zip(rows.tolist(), log10_p[rows].tolist(), backoff[rows].tolist(), strict=True):
+        yield f"{p:.7g}\t{texts[row]}\n" if weight == np.inf else f"{p:.7g}\t{texts[row]}\t{weight:.7g}\n"
+
+
+def write_arpa(model: BackoffModel, path: Path | str, *, comment: str = "") -> None:
+    """Write `model` as an ARPA file (gzipped if the name ends in .gz), whole or not at all."""
+    write_text(Path(path), format_arpa(model, comment))
+
+
+def with_unigrams(model: BackoffModel, words: Sequence[str]) -> BackoffModel:
+    """`model` with those of `words` that it does not list added with probability zero and no backoff weight.
+
+    KenLM refuses files without <s> and </s> and complains of files without <unk>.
+    """
+    old = model.trie.vocabulary
+    vocabulary = Vocabulary.of((*old.words, *words))
+    new_word = vocabulary.ids(old.words)
+    new_row, keys = new_word, [np.arange(len(vocabulary))]
+    for n in range(2, model.order + 1):
+        # Numbers grow in the same order as before, so rows stay sorted.
+        keys.append(new_row[model.trie.prefix(n)] * len(vocabulary) + new_word[model.trie.word(n)])
+        new_row = np.arange(len(keys[-1]))
+    log10_p = np.full(len(vocabulary), -np.inf, np.float32)
+    backoff = np.full(len(vocabulary), np.nan, np.float32)
+    log10_p[new_word], backoff[new_word] = model.log10_ps[0], model.backoffs[0]
+    return replace(
+        model,
+        trie=Trie(vocabulary, tuple(keys)),
+        log10_ps=(log10_p, *model.log10_ps[1:]),
+        backoffs=(backoff, *model.backoffs[1:]),
+    )
+
+
+def read_arpa(path: Path | str) -> BackoffModel:
+    """Read an ARPA file (gzipped if the name ends in .gz).
+
+    Raises LanguageModelError, naming the file, the line, the value and what is expected, for whatever KenLM would
+    refuse: wrong counts, positive or missing numbers, words or contexts that are not listed, a missing end.
+    """
+    return _Reader(path).model()
+
+
+class _Reader:
+    """The lines of one file, the place in them, and the grammar's productions."""
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = path
+        self.lines = read_text(Path(path), LanguageModelError).replace("\r\n", "\n").split("\n")
+        if self.lines[-1] == "":
+            self.lines.pop()
+        self.line = 0
+
+    def error(self, message: str, line: int | None = None) -> LanguageModelError:
+        return LanguageModelError(at(self.path, self.line + 1 if line is None else line + 1, message))
+
+    def model(self) -> BackoffModel:
+        sizes = self.header()
+        model = BackoffModel(Trie(Vocabulary((), {}), ()), (), ())
+        for n, size in enumerate(sizes, start=1):
+            first, words, log10_p, backoff = self.section(n, size, top=n == len(sizes))
+            if n == 1:
+                vocabulary = Vocabulary.of(word for (word,) in words)
+                model = replace(model, trie=Trie(vocabulary, ()))
+                key = vocabulary.ids([word for (word,) in words])
+            else:
+                model, key = self.keys(model, words, first)
+            model = _with_order(model, key, log10_p, backoff)
+        self.end()
+        return model
+
+    def header(self) -> list[int]:
+        while self.line < len(self.lines) and (not self.lines[self.line].strip() or self.lines[self.line][0] == "#"):
+            self.line += 1
+        if self.take("an ARPA file, starting with \\data\\").rstrip() != "\\data\\":
+            self.line -= 1
+            raise self.error(f"{self.lines[self.line][:40]!r} found, \\data\\ expected; is this an ARPA file?")
+        sizes: list[int] = []
+        while self.line < len(self.lines) and self.lines[self.line].strip():
+            match = re.fullmatch(r"ngram\s+(\d+)\s*=\s*(\d+)\s*", self.lines[self.line])
+            if not match or int(match[1]) != len(sizes) + 1:
+                raise self.error(f"{self.lines[self.line][:40]!r} found, 'ngram {len(sizes) + 1}=COUNT' expected")
+            sizes.append(int(match[2]))
+            self.line += 1
+        if not sizes:
+            raise self.error("no 'ngram 1=COUNT' line after \\data\\")
+        return sizes
+
+    def section(self, n: int, size: int, *, top: bool) -> tuple[int, list[list[str]], Singles, Singles]:
+        self.skip_blank()
+        if self.take(f"\\{n}-grams:") != f"\\{n}-grams:":
+            raise self.error(f"{self.lines[self.line - 1][:40]!r} found, \\{n}-grams: expected", self.line - 1)
+        first = self.line
+        last = min(first + size, len(self.lines))
+        fields = [self.ngram(line, n, top) for line in range(first, last)]
+        self.line = last
+        if len(fields) < size or (last < len(self.lines) and self.lines[last].strip() and self.lines[last][0] != "\\"):
+            raise self.error(
+                f"the header promises {size} {n}-grams, and there are {'fewer' if len(fields) < size else 'more'}"
+            )
+        log10_p = np.array([p for p, _, _ in fields], np.float32)
+        backoff = np.array([weight for _, _, weight in fields], np.float32)
+        return first, [words for _, words, _ in fields], log10_p, backoff
+
+    def ngram(self, line: int, n: int, top: bool) -> tuple[float, list[str], float]:
+        text = self.lines[line]
+        parts = text.split("\t") if n == 1 else re.split(r"[ \t]+", text.lstrip(" \t"))
+        weighted = len(parts) == n + 2 and text.endswith("\t" + parts[-1])
+        if not (weighted or len(parts) == n + 1) or not all(parts):
+            expected = f"a number, {n} word{'s' * (n > 1)} and perhaps a tab and a weight"
+            raise self.error(f"{text[:60]!r} found, {expected} expected", line)
+        log10_p = self.number(parts[0], line, "log10 probability")
+        if log10_p > 0:
+            raise self.error(f"log10 probability {parts[0]} is above 0", line)
+        weight = np.nan
+        if weighted:
+            weight = self.number(parts[-1], line, "backoff weight")
+            if not np.isfinite(weight):
+                raise self.error(f"backoff weight {parts[-1]} is not finite", line)
+            if top and weight != 0:
+                raise self.error(f"backoff weight {parts[-1]} on the highest order, which has none", line)
+        return _zero(log10_p), parts[1 : n + 1], np.nan if top else _zero(weight)
+
+    def number(self, text: str, line: int, what: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if np.isnan(value):
+            raise self.error(f"{what} {text!r} is not a number", line)
+        return value
+
+    def keys(self, model: BackoffModel, words: list[list[str]], first: int) -> tuple[BackoffModel, Ints]:
+        """The trie keys of n-grams one longer than `model`'s, and the model with the contexts they need."""
+        vocabulary = model.trie.vocabulary
+        n = model.order + 1
+        numbers = np.array([[vocabulary.index.get(word, -1) for word in ngram] for ngram in words], np.int64)
+        numbers = numbers.reshape(-1, n)
+        for i in np.flatnonzero((numbers < 0).any(axis=1))[:1].tolist():
+            word = words[i][int(np.argmin(numbers[i]))]
+            raise self.error(f"the word {word!r} is not among the 1-grams", first + i)
+        row = _rows(model.trie, numbers[:, :-1])
+        lacking = np.flatnonzero(row < 0)
+        if len(lacking):
+            # KenLM takes a missing context for granted where another n-gram ends in it.
+            endings = set(map(tuple, numbers[:, 1:].tolist()))
+            for i in lacking.tolist():
+                if tuple(numbers[i, :-1].tolist()) not in endings:
+                    raise self.error(
+                        f"the context {' '.join(words[i][:-1])!r} is not among the {n - 1}-grams", first + i
+                    )
+            model = self.with_contexts(model, np.unique(numbers[lacking, :-1], axis=0), first + int(lacking[0]))
+            row = _rows(model.trie, numbers[:, :-1])
+        return model, row * len(vocabulary) + numbers[:, -1]
+
+    def with_contexts(self, model: BackoffModel, numbers: Ints, line: int) -> BackoffModel:
+        """`model` with n-grams (m, order) of its highest order added at the value that it gives them by back-off."""
+        prefix = _rows(model.trie, numbers[:, :-1])
+        if (prefix < 0).any():
+            raise self.error("the context of an n-gram is missing at two orders", line)
+        trie = model.trie
+        log10_p = np.array([score_ids(model, ngram)[0][-1] for ngram in numbers], np.float32)
+        shorter = BackoffModel(Trie(trie.vocabulary, trie.keys[:-1]), model.log10_ps[:-1], model.backoffs[:-1])
+        return _with_order(
+            shorter,
+            np.concatenate([trie.keys[-1], prefix * len(trie.vocabulary) + numbers[:, -1]]),
+            np.concatenate([model.log10_ps[-1], log10_p]),
+            np.concatenate([model.backoffs[-1], np.full(len(log10_p), np.nan, np.float32)]),
+        )
+
+    def end(self) -> None:
+        self.skip_blank()
+        if self.take("\\end\\").rstrip() != "\\end\\":
+            raise self.error(f"{self.lines[self.line - 1][:40]!r} found, \\end\\ expected", self.line - 1)
+        self.skip_blank()
+        if self.line < len(self.lines):
+            raise self.error(f"{self.lines[self.line][:40]!r} found after \\end\\")
+
+    def skip_blank(self) -> None:
+        while self.line < len(self.lines) and not self.lines[self.line].strip():
+            self.line += 1
+
+    def take(self, expected: str) -> str:
+        if self.line >= len(self.lines):
+            raise self.error(
+                f"the file ends where {expected} is expected; is it truncated?", max(0, len(self.lines) - 1)
+            )
+        self.line += 1
+        return self.lines[self.line - 1]
+
+
+def _zero(value: float) -> float:
+    return -np.inf if value <= LOG_ZERO else value
+
+
+def _rows(trie: Trie, numbers: Ints) -> Ints:
+    """Rows (m,) of the n-grams whose word numbers are the rows of `numbers` (m, n), -1 where not listed."""
+    row = numbers[:, 0]
+    for n in range(2, numbers.shape[1] + 1):
+        row = trie.find(n, row, numbers[:, n - 1])
+    return row
+
+
+def _with_order(model: BackoffModel, key: Ints, log10_p: Singles, backoff: Singles) -> BackoffModel:
+    """`model` with one order more, given in any order; of duplicates the first counts, as in KenLM."""
+    distinct, rows = np.unique(key, return_index=True)
+    return BackoffModel(
+        Trie(model.trie.vocabulary, (*model.trie.keys, distinct)),
+        (*model.log10_ps, log10_p[rows]),
+        (*model.backoffs, backoff[rows]),
+    )

@@ -1,0 +1,139 @@
+"""Is a model right? Every context must sum to 1, and KenLM must give every word of any stream the same probability."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import LanguageModelError
+from placerec.lm.arpa import read_arpa
+from placerec.lm.backoff import BackoffModel
+from placerec.lm.external import KENLM_MAX_ORDER, kenlm_scorer
+from placerec.lm.trie import per_context
+
+# Half a unit of the seventh digit for each of the terms that a context's sum is made of.
+SUM_TOLERANCE = 1e-5
+# KenLM adds float32 numbers, we add float64 ones: `float32` keeps 7 digits of values up to 100.
+AGREEMENT_TOLERANCE = 2e-6
+# Both stand for log 0.
+LOG_ZERO = -90.0
+
+
+@dataclass(frozen=True)
+class ModelCheck:
+    """What `check_model` found in one file."""
+
+    path: str
+    order: int
+    contexts: int
+    lowest_sum: float
+    highest_sum: float
+    worst_context: str
+    tokens: int
+    largest_difference: float | None  # None: KenLM does not do this order
+
+    @property
+    def ok(self) -> bool:
+        """Whether sums and probabilities are within the tolerances."""
+        sums = max(abs(self.lowest_sum - 1), abs(self.highest_sum - 1)) <= SUM_TOLERANCE
+        return sums and (self.largest_difference is None or self.largest_difference <= AGREEMENT_TOLERANCE)
+
+    def sentence(self) -> str:
+        """The check in a line for people."""
+        sums = f"{self.contexts} contexts sum to {self.lowest_sum:.7f} .. {self.highest_sum:.7f}"
+        if self.largest_difference is None:
+            scores = f"KenLM does no order above {KENLM_MAX_ORDER}, not compared"
+        else:
+            scores = f"KenLM agrees on {self.tokens} tokens, largest difference {self.largest_difference:.1e}"
+        verdict = "ok" if self.ok else f"FAIL (worst context: {self.worst_context})"
+        return f"{self.path}: order {self.order}: {sums}; {scores}: {verdict}"
+
+
+def context_sums(model: BackoffModel) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.float64]]]:
+    """Per order n: n, the rows (m,) of order n-1 that are contexts, and the sum (m,) over all words w of p(w | context).
+
+    <s> is not predicted and left out; the empty context comes first, as row 0 of order 0.
+    """
+    word_p = [np.power(10.0, log10_p.astype(np.float64)) for log10_p in model.log10_ps]
+    start = model.trie.vocabulary.index.get("<s>", -1)
+    if start >= 0:
+        word_p[0][start] = 0.0
+    total = np.array([word_p[0].sum()])
+    yield 1, np.zeros(1, np.int64), total
+    for n in range(2, model.order + 1):
+        prefix, suffix = model.trie.prefix(n), model.trie.suffixes[n - 1]
+        size = len(model.trie.keys[n - 2])
+        # What the shorter context gives the same words, which the longer one overrules. A suffix that the file leaves
+        # out has its backed-off value.
+        shorter = np.where(suffix >= 0, word_p[n - 2][suffix], _backed_off_p(model, n, suffix < 0))
+        context_suffix = model.trie.suffixes[n - 2] if n > 2 else np.zeros(size, np.int64)
+        shorter_total = np.where(context_suffix >= 0, total[context_suffix], 1.0)
+        weight = np.power(10.0, np.nan_to_num(model.backoffs[n - 2].astype(np.float64), nan=0.0, neginf=-np.inf))
+        seen = per_context(prefix, size, word_p[n - 1])
+        total = seen + weight * (shorter_total - per_context(prefix, size, shorter))
+        rows = np.flatnonzero(~np.isnan(model.backoffs[n - 2]) | (np.bincount(prefix, minlength=size) > 0))
+        yield n, rows, total[rows]
+
+
+def _backed_off_p(model: BackoffModel, n: int, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """p float64 (m_n,) of the masked n-grams of order n without their first word, word by word; 0 elsewhere."""
+    p = np.zeros(len(rows))
+    texts = model.trie.texts(n) if rows.any() else []
+    for row in np.flatnonzero(rows).tolist():
+        words = texts[row].split(" ")
+        p[row] = 10 ** model.log10_p(words[-1], words[1:-1])
+    return p
+
+
+def generated_stream(model: BackoffModel, length: int, seed: int = 0) -> list[str]:
+    """`length` words to compare scorers on: listed n-grams, so that all orders answer, and random words."""
+    generator = np.random.Generator(np.random.PCG64(seed))
+    plain = [word for word in model.words if word not in ("<s>", "</s>", "<unk>")]
+    if not plain:
+        raise LanguageModelError("the model lists no word but its markers; there is nothing to score")
+    texts = model.trie.texts(model.order)
+    listed = [text for text in texts if not {"<s>", "</s>", "<unk>"} & set(text.split(" "))]
+    words: list[str] = []
+    while len(words) < length:
+        if listed and generator.random() < 0.7:
+            words += listed[int(generator.integers(len(listed)))].split(" ")
+        else:
+            words.append(plain[int(generator.integers(len(plain)))])
+    return words[:length]
+
+
+def check_model(path: Path | str, *, tokens: int = 2000, seed: int = 0) -> ModelCheck:
+    """Check one ARPA file: the sum of every context, and KenLM's log10 p of every token of a generated stream.
+
+    Orders above 6 are not compared (KenLM's limit); order 1, which KenLM refuses, is compared through a padded copy.
+    Raises LanguageModelError for an unreadable file, MissingExtraError without KenLM.
+    """
+    model = read_arpa(path)
+    sums, names = [], []
+    for n, rows, totals in context_sums(model):
+        worst = int(np.argmax(np.abs(totals - 1))) if len(totals) else 0
+        if len(totals):
+            sums.append(totals)
+            names.append((float(totals[worst]), model.trie.texts(n - 1)[int(rows[worst])] if n > 1 else "(empty)"))
+    every = np.concatenate(sums)
+    words = generated_stream(model, tokens, seed)
+    difference = None
+    if model.order <= KENLM_MAX_ORDER:
+        difference = _largest_difference(model.score(words), kenlm_scorer(path)(words))
+    return ModelCheck(
+        path=str(path),
+        order=model.order,
+        contexts=len(every),
+        lowest_sum=float(every.min()),
+        highest_sum=float(every.max()),
+        worst_context=max(names, key=lambda name: abs(name[0] - 1))[1],
+        tokens=len(words) if difference is not None else 0,
+        largest_difference=difference,
+    )
+
+
+def _largest_difference(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> float:
+    zero = (ours < LOG_ZERO) & (theirs < LOG_ZERO)
+    return float(np.abs(np.where(zero, 0.0, ours) - np.where(zero, 0.0, theirs)).max(initial=0.0))

@@ -1,0 +1,143 @@
+"""Reading a model as a person would: what is in it, and how it arrives at a probability."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from placerec.errors import LanguageModelError
+from placerec.files import read_text
+from placerec.lm.arpa import read_arpa
+from placerec.lm.backoff import BackoffModel
+from placerec.lm.checks import context_sums
+from placerec.lm.counts import SENTENCE_START
+
+
+def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5) -> dict[str, Any]:
+    """What an ARPA file holds, as plain data.
+
+    `ngrams_per_order`; `contexts` and their lowest and highest sum; per order the `top` n-grams by joint probability
+    (how often the model expects them); for each of `ngrams` (words joined by blanks) its p, step by step. Raises
+    LanguageModelError for a file that is not ARPA or a word that it does not list.
+    """
+    model = read_arpa(path)
+    sums = np.concatenate([totals for _, _, totals in context_sums(model)])
+    return {
+        "path": str(path),
+        "comment": _comment(path),
+        "order": model.order,
+        "ngrams_per_order": [len(keys) for keys in model.trie.keys],
+        "contexts": len(sums),
+        "lowest_sum": float(sums.min()),
+        "highest_sum": float(sums.max()),
+        "most_frequent": [most_frequent(model, n, top) for n in range(1, model.order + 1)],
+        "explained": [explain(model, ngram.split()) for ngram in ngrams],
+    }
+
+
+def most_frequent(model: BackoffModel, n: int, top: int) -> list[dict[str, Any]]:
+    """The `top` n-grams of order n by joint probability (that of the context times p of the last word)."""
+    joint = model.log10_ps[0].astype(np.float64)
+    start = model.trie.vocabulary.index.get(SENTENCE_START)
+    if start is not None:
+        # <s> is never predicted: what follows it is reached with certainty at the start of a sentence.
+        joint[start] = 0.0 if n > 1 else -np.inf
+    for k in range(2, n + 1):
+        joint = joint[model.trie.prefix(k)] + model.log10_ps[k - 1]
+    first = np.argsort(-joint, kind="stable")[:top]
+    texts = model.trie.texts(n) if len(first) else []
+    return [{"ngram": texts[row], "p": _finite(10 ** float(joint[row]))} for row in first.tolist()]
+
+
+def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:
+    """How the model arrives at p(last word | words before): the contexts it tried, the weights paid, what answered."""
+    if not words:
+        raise LanguageModelError("an n-gram to explain holds no word")
+    for word in words:
+        if word not in model:
+            raise LanguageModelError(f"the word {word!r} is not in the model")
+    *history, word = words
+    history = history[len(history) - model.order + 1 :] if len(history) >= model.order else history
+    steps: list[dict[str, Any]] = []
+    for start in range(len(history) + 1):
+        context = history[start:]
+        row = _row(model, [*context, word])
+        n = len(context) + 1
+        if row >= 0:
+            log10_p = float(model.log10_ps[n - 1][row])
+            steps.append({"ngram": " ".join([*context, word]), "found": True, "log10_p": _finite(log10_p)})
+            break
+        at = _row(model, context)
+        weight = float(model.backoffs[n - 2][at]) if at >= 0 else math.nan
+        known = not math.isnan(weight)
+        steps.append(
+            {
+                "ngram": " ".join([*context, word]),
+                "found": False,
+                "context": " ".join(context),
+                "context_listed": known,
+                "log10_backoff": _finite(weight) if known else 0.0,
+            }
+        )
+    total = model.log10_p(word, history)
+    return {"word": word, "history": history, "log10_p": _finite(total), "p": 10**total, "steps": steps}
+
+
+def format_inspection(found: dict[str, Any]) -> str:
+    """The inspection as text for people."""
+    lines = [f"{found['path']}: order {found['order']}"]
+    if found["comment"]:
+        lines.append(found["comment"])
+    lines.append(
+        "n-grams  " + ", ".join(f"{count} of order {n}" for n, count in enumerate(found["ngrams_per_order"], 1))
+    )
+    lines.append(f"contexts {found['contexts']}, each sums to {found['lowest_sum']:.7f} .. {found['highest_sum']:.7f}")
+    for n, entries in enumerate(found["most_frequent"], 1):
+        if entries:
+            lines.append(f"most frequent of order {n}, by the model's own probability")
+            lines += [f"  {entry['p']:<12.6g} {entry['ngram']}" for entry in entries]
+    for explained in found["explained"]:
+        lines += ["", *_explanation(explained)]
+    return "\n".join(lines)
+
+
+def _explanation(explained: dict[str, Any]) -> list[str]:
+    given = f" | {' '.join(explained['history'])}" if explained["history"] else ""
+    lines = [f"p({explained['word']}{given})"]
+    terms = []
+    for step in explained["steps"]:
+        if step["found"]:
+            lines.append(f"  {step['ngram']!r} is listed: log10 p = {_show(step['log10_p'])}")
+            terms.append(_show(step["log10_p"]))
+        elif step["context_listed"]:
+            lines.append(
+                f"  {step['ngram']!r} is not listed: back off from {step['context']!r},"
+                f" weight {_show(step['log10_backoff'])}"
+            )
+            terms.append(_show(step["log10_backoff"]))
+        else:
+            lines.append(f"  {step['ngram']!r} is not listed, nor is its context {step['context']!r}: nothing to pay")
+    lines.append(f"  log10 p = {' + '.join(terms)} = {_show(explained['log10_p'])}, p = {explained['p']:.7g}")
+    return lines
+
+
+def _row(model: BackoffModel, words: Sequence[str]) -> int:
+    row = np.zeros(1, np.int64)
+    for n, number in enumerate(model.ids(words), start=1):
+        row = model.trie.find(n, row, np.array([number]))
+    return int(row[0])
+
+
+def _comment(path: Path | str) -> str:
+    first = read_text(Path(path), LanguageModelError).partition("\n")[0]
+    return first if first.startswith("#") else ""
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _show(value: float | None) -> str:
+    return "-inf" if value is None else f"{value:.7g}"

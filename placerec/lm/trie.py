@@ -1,0 +1,129 @@
+"""Which n-grams there are: a table per order, sorted, so that a look-up is a binary search on whole arrays.
+
+Words are numbered in the order of their code points (for UTF-8 that is byte order, the order of SRILM's files), so
+number order is text order. The n-grams of order n are rows; a row is known by the row of its first n-1 words in the
+table below and by its last word. Order 1 is dense: row = word number.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """Words in code-point order; a word's number is its place in the order."""
+
+    words: tuple[str, ...]
+    index: dict[str, int] = field(repr=False)
+
+    @staticmethod
+    def of(words: Iterable[str]) -> "Vocabulary":
+        """The vocabulary of the distinct `words`."""
+        ordered = tuple(sorted(set(words)))
+        return Vocabulary(ordered, {word: number for number, word in enumerate(ordered)})
+
+    def __len__(self) -> int:
+        return len(self.words)
+
+    def ids(self, words: Sequence[str]) -> Ints:
+        """Word numbers int64 (T,) of T words, -1 for a word that is not listed."""
+        return np.fromiter((self.index.get(word, -1) for word in words), np.int64, len(words))
+
+    def mask(self, words: Iterable[str]) -> NDArray[np.bool_]:
+        """bool (V,), true at those of `words` that are listed."""
+        mask = np.zeros(len(self), bool)
+        mask[[self.index[word] for word in words if word in self.index]] = True
+        return mask
+
+
+@dataclass(frozen=True)
+class Trie:
+    """The n-grams of orders 1..N over `vocabulary`.
+
+    `keys[n-1]`, int64 (m_n,), ascending: prefix row times V plus last word. `keys[0]` is 0..V-1.
+    """
+
+    vocabulary: Vocabulary
+    keys: tuple[Ints, ...] = field(repr=False)
+
+    @property
+    def order(self) -> int:
+        return len(self.keys)
+
+    def prefix(self, n: int) -> Ints:
+        """Rows of order n-1, int64 (m_n,): each n-gram without its last word (n >= 2)."""
+        return self.keys[n - 1] // len(self.vocabulary)
+
+    def word(self, n: int) -> Ints:
+        """The last word of each n-gram, int64 (m_n,)."""
+        return self.keys[n - 1] % len(self.vocabulary) if n > 1 else self.keys[0]
+
+    def find(self, n: int, prefix: Ints, word: Ints) -> Ints:
+        """Rows of order n with these prefix rows and last words, int64, -1 where there is none (or either is -1)."""
+        if n == 1:
+            return word
+        keys = self.keys[n - 1]
+        if len(keys) == 0:
+            return np.full(np.shape(word), -1, np.int64)
+        wanted = np.where((prefix >= 0) & (word >= 0), prefix * len(self.vocabulary) + word, -1)
+        row = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.where(keys[row] == wanted, row, -1)
+
+    @cached_property
+    def suffixes(self) -> tuple[Ints, ...]:
+        """Per order n, rows of order n-1, int64 (m_n,): each n-gram without its first word; -1 where not listed.
+
+        Order 1 has zeros.
+        """
+        found = [np.zeros(len(self.vocabulary), np.int64)]
+        for n in range(2, self.order + 1):
+            word = self.word(n)
+            found.append(word if n == 2 else self.find(n - 1, found[n - 2][self.prefix(n)], word))
+        return tuple(found)
+
+    def texts(self, n: int) -> list[str]:
+        """The n-grams of order n as words joined by blanks."""
+        if n == 1:
+            return list(self.vocabulary.words)
+        shorter, words = self.texts(n - 1), self.vocabulary.words
+        return [
+            f"{shorter[row]} {words[word]}"
+            for row, word in zip(self.prefix(n).tolist(), self.word(n).tolist(), strict=True)
+        ]
+
+    def context_ranks(self) -> Iterator[Ints]:
+        """Per order n, the place int64 (m_n,) of each n-gram when read from its last word to its first.
+
+        SRILM sorts the contexts of its files so (section 7 of our specification).
+        """
+        rank = np.arange(len(self.vocabulary))
+        yield rank
+        for n in range(2, self.order + 1):
+            by_word = np.lexsort((rank[self.prefix(n)], self.word(n)))
+            rank = np.empty(len(by_word), np.int64)
+            rank[by_word] = np.arange(len(by_word))
+            yield rank
+
+    def keep(self, masks: Sequence[NDArray[np.bool_]]) -> "Trie":
+        """The trie of the rows that `masks`, bool (m_n,) per order, name; prefixes of kept rows must be kept."""
+        words = self.vocabulary.words
+        vocabulary = Vocabulary.of(words[number] for number in np.flatnonzero(masks[0]).tolist())
+        new_word = np.cumsum(masks[0]) - 1
+        new_row, keys = new_word, [np.arange(len(vocabulary))]
+        for n in range(2, self.order + 1):
+            kept = self.keys[n - 1][masks[n - 1]]
+            keys.append(new_row[kept // len(words)] * len(vocabulary) + new_word[kept % len(words)])
+            new_row = np.cumsum(masks[n - 1]) - 1
+        return Trie(vocabulary, tuple(keys))
+
+
+def per_context(prefix: Ints, size: int, values: NDArray[Any] | None = None) -> NDArray[np.float64]:
+    """Sums float64 (size,) of `values` (default: ones) over the rows that share a prefix row."""
+    return np.bincount(prefix, weights=values, minlength=size).astype(np.float64)

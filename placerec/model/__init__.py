@@ -1,0 +1,22 @@
+"""The MODEL/ folder: train, load."""
+
+from placerec.model.corpus import Corpus, read_corpus
+from placerec.model.decode import decode, decode_lines, format_beliefs
+from placerec.model.load import PlaceModels, load_model, load_recognizer
+from placerec.model.train import Options, parse_min_count, train_lm, train_model, train_place
+
+__all__ = [
+    "Corpus",
+    "Options",
+    "PlaceModels",
+    "decode",
+    "decode_lines",
+    "format_beliefs",
+    "load_model",
+    "load_recognizer",
+    "parse_min_count",
+    "read_corpus",
+    "train_lm",
+    "train_model",
+    "train_place",
+]

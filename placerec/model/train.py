@@ -1,0 +1,205 @@
+"""From sentences per place to a MODEL/ folder: one ARPA file per place, and all that made it, as text.
+
+MODEL/PLACE.arpa             the language models: all that `decode` computes with
+MODEL/model.json             places, options, and the equivalent `ngram-count` commands
+MODEL/vocab.txt              all words
+MODEL/sentences/PLACE.txt    what was counted
+MODEL/counts/PLACE.counts    the counts
+MODEL/nonevents.txt          without markers: what the `ngram-count` commands need to leave </s> out
+"""
+
+import json
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from placerec.errors import ModelError
+from placerec.files import whole_folder, write_text
+from placerec.frames.places import check_place, check_twins
+from placerec.lm import (
+    BackoffModel,
+    count_ngrams,
+    estimate,
+    format_counts,
+    smoothing,
+    with_unigrams,
+    write_arpa,
+)
+from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.model.corpus import read_corpus
+from placerec.version import __version__
+from placerec.words import Selection, Sentences, format_sentences, write_vocabulary
+
+FORMAT = "placerec model 1"
+OWNED = ("*.arpa", "model.json", "vocab.txt", "nonevents.txt", "sentences", "counts")
+MAX_ORDER = 9
+log = logging.getLogger(__name__)
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How language models are made; every name is that of the command line.
+
+    `order`: n-gram order (1: the classical HMM). `min_count`: per order, the last repeats. `markers`: whether <s> and
+    </s> are counted.
+    """
+
+    order: int = 2
+    smoothing: str = "witten-bell"
+    delta: float = 1.0
+    min_count: tuple[int, ...] = (1,)
+    markers: bool = False
+    select: Selection = Selection()
+
+
+def parse_min_count(text: str) -> tuple[int, ...]:
+    """Minimum counts per order from `N[,N...]` or `srilm` (1,1,2: what ngram-count does); ModelError otherwise."""
+    if text == "srilm":
+        return (1, 1, 2)
+    parts = text.split(",")
+    if not all(part.isascii() and part.isdigit() and int(part) > 0 for part in parts):
+        raise ModelError(f"minimum count {text!r} is not understood; give numbers above 0 as in 1,1,2, or srilm")
+    return tuple(int(part) for part in parts)
+
+
+def train_place(sentences: Sentences, vocabulary: Sequence[str], options: Options) -> tuple[BackoffModel, str]:
+    """The language model of one place (V = all words of `vocabulary`), and the text of its counts file."""
+    counts = count_ngrams(sentences, options.order, vocabulary=vocabulary, markers=options.markers)
+    model = estimate(
+        counts,
+        smoothing(options.smoothing, options.delta),
+        min_count=options.min_count,
+        non_events=() if options.markers else (SENTENCE_END,),
+    )
+    return with_unigrams(model, (UNKNOWN, SENTENCE_START, SENTENCE_END)), format_counts(counts)
+
+
+def train_lm(
+    tokens: Sequence[Path | str],
+    out: Path | str,
+    *,
+    options: Options = Options(),
+    vocabulary: Path | str | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """`placerec train-lm`: read token streams or sentences (see `read_corpus`) and write a MODEL/ folder."""
+    corpus = read_corpus(tokens, selection=options.select, vocabulary=vocabulary)
+    train_model(
+        corpus.sentences,
+        corpus.vocabulary,
+        out,
+        options=options,
+        sequences=corpus.sequences,
+        dictionary=corpus.dictionary,
+        progress=progress,
+    )
+    log.info("%s: %d places, order %d, %s", out, len(corpus.sentences), options.order, options.smoothing)
+
+
+def train_model(
+    sentences: Mapping[str, Sentences],
+    vocabulary: Sequence[str],
+    out: Path | str,
+    *,
+    options: Options = Options(),
+    sequences: Sequence[str] = (),
+    dictionary: str | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Train one language model per place and write the MODEL/ folder `out`, whole or not at all.
+
+    `sequences`: names of the training sequences, and `dictionary`: fingerprint of what made their words; both are
+    recorded. Raises ModelError for no place, a bad name of a place, a word that the vocabulary lacks or a bad option.
+    """
+    _check(sentences, vocabulary, options)
+    with whole_folder(Path(out), OWNED) as folder:
+        (folder / "sentences").mkdir()
+        (folder / "counts").mkdir()
+        write_vocabulary(vocabulary, folder / "vocab.txt")
+        if not options.markers:
+            write_text(folder / "nonevents.txt", SENTENCE_END + "\n")
+        for done, (place, text) in enumerate(sentences.items()):
+            if not text:
+                log.warning("place %s: no visit holds a selected word; its model is uniform", place)
+            model, counts = train_place(text, vocabulary, options)
+            write_text(folder / "sentences" / f"{place}.txt", format_sentences(text))
+            write_text(folder / "counts" / f"{place}.counts", counts)
+            write_arpa(model, folder / f"{place}.arpa", comment=signature(place, len(vocabulary), options))
+            if progress:
+                progress(done + 1, len(sentences))
+        description = describe_model(list(sentences), len(vocabulary), options, sequences, dictionary)
+        write_text(folder / "model.json", json.dumps(description, indent=2, ensure_ascii=False) + "\n")
+
+
+def signature(place: str, words: int, options: Options) -> str:
+    """What made a model, in one line: the first line of its ARPA file."""
+    delta = f" delta={options.delta:g}" if options.smoothing.startswith("lidstone") else ""
+    return (
+        f"placerec {__version__} place={place} order={options.order} smoothing={options.smoothing}{delta}"
+        f" select={options.select} min-count={','.join(map(str, options.min_count))}"
+        f" markers={'yes' if options.markers else 'no'} vocab={words}"
+    )
+
+
+def ngram_count_command(place: str, options: Options) -> str | None:
+    """The SRILM command that makes the same model of the same sentences, run in MODEL/; None where there is none."""
+    smoothings = {
+        "witten-bell": "-wbdiscount -interpolate",
+        "witten-bell-backoff": "-wbdiscount",
+        "lidstone-backoff": f"-addsmooth {options.delta:g}",
+    }
+    if options.smoothing not in smoothings:
+        return None
+    minima = [options.min_count[min(n, len(options.min_count)) - 1] for n in range(1, options.order + 1)]
+    return " ".join(
+        [
+            f"ngram-count -text sentences/{place}.txt -vocab vocab.txt",
+            *([] if options.markers else ["-nonevents nonevents.txt -no-sos -no-eos"]),
+            f"-order {options.order}",
+            *(f"-gt{n}min {minimum}" for n, minimum in enumerate(minima, start=1)),
+            smoothings[options.smoothing],
+            f"-lm {place}.arpa",
+        ]
+    )
+
+
+def describe_model(
+    places: Sequence[str], words: int, options: Options, sequences: Sequence[str], dictionary: str | None
+) -> dict[str, Any]:
+    """The content of model.json."""
+    return {
+        "format": FORMAT,
+        "version": __version__,
+        "places": list(places),
+        "order": options.order,
+        "smoothing": options.smoothing,
+        "delta": options.delta,
+        "min_count": list(options.min_count),
+        "markers": options.markers,
+        "select": str(options.select),
+        "vocabulary": words,
+        "sequences": sorted(sequences),
+        "dictionary": dictionary,
+        "ngram_count": {place: ngram_count_command(place, options) for place in places},
+    }
+
+
+def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: Options) -> None:
+    if not 1 <= options.order <= MAX_ORDER:
+        raise ModelError(f"order {options.order} is not between 1 and {MAX_ORDER}")
+    smoothing(options.smoothing, options.delta)
+    if not sentences:
+        raise ModelError("no labelled frame found: label the frames (places.lst, or one folder per place) to train")
+    for place in sentences:
+        if reason := check_place(place):
+            raise ModelError(f"place {place!r} {reason}; rename it")
+    check_twins((place, "the training data") for place in sentences)
+    listed = set(vocabulary)
+    for place, text in sentences.items():
+        for i, visit in enumerate(text, start=1):
+            for word in visit:
+                if word not in listed:
+                    raise ModelError(f"place {place}, visit {i}: the word {word!r} is not in the vocabulary")

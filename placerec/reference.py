@@ -1,0 +1,92 @@
+"""The readable specification: counts, smoothing, back-off and filter in plain dictionaries and loops.
+
+Slow, and without the roundings of SRILM's files; the fast rooms `lm` and `hohmm` are tested against it. It imports
+nothing of placerec. An n-gram is a tuple of words; a model is (probability, weight): {n-gram: p}, {context: weight}.
+"""
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+
+Ngram = tuple[str, ...]
+Model = tuple[Mapping[Ngram, float], Mapping[Ngram, float]]
+
+
+def count(sentences: Iterable[Sequence[str]], order: int) -> Counter[Ngram]:
+    """How often every n-gram of length 1..order occurs; none spans two sentences."""
+    counts: Counter[Ngram] = Counter()
+    for sentence in sentences:
+        for start in range(len(sentence)):
+            for end in range(start + 1, min(start + order, len(sentence)) + 1):
+                counts[tuple(sentence[start:end])] += 1
+    return counts
+
+
+def smoothed(counts: Mapping[Ngram, int], vocabulary: Sequence[str], order: int, name: str, delta: float) -> Model:
+    """p of every seen n-gram and the backoff weight of every seen context, by the formulas of readings 1.2.
+
+    N: occurrences of the context h, T: distinct words after it, V: words in the vocabulary.
+    """
+    V = len(vocabulary)
+    after: defaultdict[Ngram, dict[str, int]] = defaultdict(dict)
+    for ngram, c in counts.items():
+        after[ngram[:-1]][ngram[-1]] = c
+    p: dict[Ngram, float] = {(word,): 1 / V for word in vocabulary}
+    weight: dict[Ngram, float] = {}
+    for h in sorted(after, key=len):
+        N, T = sum(after[h].values()), len(after[h])
+        spread = T if name.startswith("witten-bell") else delta * V
+        lower = {word: backed_off((p, weight), word, h[1:]) if h else 1 / V for word in after[h]}
+        if name.endswith("-backoff"):
+            added = delta if name == "lidstone-backoff" else 0
+            seen = {word: (c + added) / (N + spread) for word, c in after[h].items()}
+        else:
+            seen = {word: (c + spread * lower[word]) / (N + spread) for word, c in after[h].items()}
+        left = 1 - sum(seen.values())
+        left_below = 1 - sum(lower.values())
+        if not h:
+            unseen = set(vocabulary) - set(seen)
+            for word in unseen or seen:
+                seen[word] = seen.get(word, 0) + left / len(unseen or seen)
+        elif left_below > 3e-6:
+            weight[h] = left / left_below
+        else:  # Every word was seen here: nothing is left to back off to.
+            seen = {word: value / (1 - left) for word, value in seen.items()}
+        p.update({(*h, word): value for word, value in seen.items()})
+    return p, weight
+
+
+def backed_off(model: Model, word: str, history: Sequence[str]) -> float:
+    """p(word | history): the longest listed n-gram, times the weights of the contexts that were too long."""
+    p, weight = model
+    h = tuple(history)
+    if (*h, word) in p:
+        return p[(*h, word)]
+    return weight.get(h, 1.0) * backed_off(model, word, h[1:]) if h else 0.0
+
+
+def belief(words: Sequence[str], models: Sequence[Model], order: int, stay: float) -> list[list[float]]:
+    """The belief over places after every word: eq. 1 with fixed transitions, uniform at the start."""
+    C = len(models)
+    leave = (1 - stay) / (C - 1) if C > 1 else 0.0
+    beliefs: list[list[float]] = []
+    log_b = [-math.log(C)] * C
+    for t, word in enumerate(words):
+        if t > 0:
+            log_b = [_log_sum([b + _log(stay if i == c else leave) for i, b in enumerate(log_b)]) for c in range(C)]
+        history = words[max(0, t - order + 1) : t]
+        weighed = [b + _log(backed_off(model, word, history)) for b, model in zip(log_b, models, strict=True)]
+        total = _log_sum(weighed)
+        if total > -math.inf:
+            log_b = [value - total for value in weighed]
+        beliefs.append([math.exp(value) for value in log_b])
+    return beliefs
+
+
+def _log(x: float) -> float:
+    return math.log(x) if x > 0 else -math.inf
+
+
+def _log_sum(logs: Sequence[float]) -> float:
+    top = max(logs)
+    return top + math.log(sum(math.exp(x - top) for x in logs)) if top > -math.inf else top

@@ -1,0 +1,21 @@
+"""From image to word: the GIST descriptor, its principal components and the self-organising map."""
+
+from placerec.vision.describe import Descriptors, describe, save_descriptors
+from placerec.vision.dictionary import Dictionary
+from placerec.vision.gist import gist
+from placerec.vision.images import fit_image
+from placerec.vision.sources import describe_sources, train_dictionary
+from placerec.vision.spec import DescriptorSpec, descriptor
+
+__all__ = [
+    "DescriptorSpec",
+    "Descriptors",
+    "Dictionary",
+    "describe",
+    "describe_sources",
+    "descriptor",
+    "fit_image",
+    "gist",
+    "save_descriptors",
+    "train_dictionary",
+]

@@ -1,0 +1,216 @@
+"""The visual dictionary: descriptor -> PCA -> unit of a self-organising map -> word."""
+
+import logging
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import VisionError
+from placerec.version import __version__
+from placerec.vision.images import Gray
+from placerec.vision.pca import Pca, fit_pca, moments, project
+from placerec.vision.som import Progress, best_units, quantisation_error, topographic_error, train_som
+from placerec.vision.spec import DescriptorSpec, descriptor
+from placerec.vision.storage import Arrays, fingerprint, read_npz, write_npz
+
+log = logging.getLogger(__name__)
+
+FORMAT, VERSION = "placerec-words", 1
+UNITS = ("live", "all")
+_REMEDY = "make it again with `placerec train-words`"
+_ARRAYS = {  # name -> type and axes: d values, k components, K units
+    "mean": (np.float64, "d"),
+    "components": (np.float32, "kd"),
+    "variances": (np.float32, "k"),
+    "codebook": (np.float32, "Kk"),
+    "hits": (np.int64, "K"),
+}
+
+
+@dataclass(frozen=True)
+class Training:
+    """How a dictionary was asked for: the options of `train-words`."""
+
+    size: int = 10
+    components: int = 80
+    seed: int = 0
+    fraction: float = 1.0
+    epochs: int | None = None
+    units: str = "live"
+
+    def __post_init__(self) -> None:
+        for name in ("size", "components", "epochs"):
+            value = getattr(self, name)
+            if not (isinstance(value, int) and value >= 1) and not (name == "epochs" and value is None):
+                raise VisionError(f"{name} {value} cannot be used; give a number of 1 or more")
+        if not isinstance(self.seed, int) or self.seed < 0:
+            raise VisionError(f"seed {self.seed} cannot be used; give a number of 0 or more")
+        if not isinstance(self.fraction, float | int) or not 0 < self.fraction <= 1:
+            raise VisionError(f"fraction {self.fraction} cannot be used; give a number above 0 and up to 1")
+        if self.units not in UNITS:
+            raise VisionError(f"no choice of units is called {self.units!r}; choose one of {', '.join(UNITS)}")
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What came of it, over the frames that were used: shares are of 1, the errors those of the map's makers.
+
+    `needed`: the components that would keep 99 % of the variance.
+    """
+
+    frames: int
+    used: int
+    epochs: int
+    explained: float
+    needed: int
+    quantisation_error: float
+    topographic_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """PCA + map: codebook float32 (K, k) and hits int64 (K,), the training frames per unit, row-major on the map."""
+
+    spec: DescriptorSpec
+    pca: Pca
+    codebook: NDArray[np.float32]
+    hits: NDArray[np.int64]
+    training: Training
+    quality: Quality
+
+    @classmethod
+    def fit(
+        cls,
+        descriptors: NDArray[np.float32],
+        *,
+        spec: DescriptorSpec,
+        size: int = 10,
+        components: int = 80,
+        seed: int = 0,
+        fraction: float = 1.0,
+        epochs: int | None = None,
+        units: str = "live",
+        progress: Progress | None = None,
+    ) -> "Dictionary":
+        """Learn size x size words from descriptors (n, spec.length) in time order (readings A25-A29).
+
+        `fraction`: the share of the frames, drawn by the seed, that PCA and map see. `units`: answer with those
+        that at least one training frame hit (`live`: no language model can know the others), or with `all`.
+        `progress`: called with epoch, epochs and quantisation error. Same input, options and seed: same bytes.
+        Raises VisionError for unusable descriptors or options.
+        """
+        training = Training(size, components, seed, fraction, epochs, units)
+        rows = _check(descriptors, spec)
+        rng = np.random.Generator(np.random.PCG64(seed))
+        n = len(rows)
+        if fraction < 1 and n:
+            rows = rows[np.sort(rng.permutation(n)[: max(1, round(fraction * n))])]
+        pca = fit_pca(moments(rows), components)
+        if len(rows) < size * size:
+            log.warning("%d frames cannot fill the %d words of a map of size %d", len(rows), size * size, size)
+        codes = project(rows, pca)
+        som = train_som(codes, size, rng=rng, epochs=epochs, progress=progress)
+        errors = [round(f(codes, som.codebook), 9) for f in (quantisation_error, topographic_error)]
+        quality = Quality(n, len(rows), som.epochs, pca.explained, pca.needed, *errors)
+        return cls(spec, pca, som.codebook, som.hits, training, quality)
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """The K words in index order: "w" and the index, zero-padded to the digits of K - 1."""
+        digits = len(str(len(self.codebook) - 1))
+        return tuple(f"w{unit:0{digits}d}" for unit in range(len(self.codebook)))
+
+    @property
+    def dead(self) -> int:
+        """The number of units that no training frame hit."""
+        return int((self.hits == 0).sum())
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of all that the file holds, 64 hexadecimal digits."""
+        return fingerprint(self._arrays(), self._meta())
+
+    def words(self, descriptors: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """The unit of every descriptor (n, spec.length), int64 (n,), and its distance in PCA space, float32 (n,).
+
+        A frame's answer does not depend on the frames around it. Raises VisionError for unusable descriptors.
+        """
+        codes = project(_check(descriptors, self.spec), self.pca)
+        return best_units(codes, self.codebook, self.hits > 0 if self.training.units == "live" else None)
+
+    def see(self, image: Gray) -> str:
+        """The word of one grey image (h, w) of 0..255; VisionError for an image that cannot be used."""
+        units, _ = self.words(descriptor(image, self.spec)[None])
+        return self.vocabulary[int(units[0])]
+
+    def save(self, path: Path | str) -> None:
+        """Write words.npz: arrays and a JSON string `meta`, no pickle; the same dictionary gives the same bytes."""
+        write_npz(Path(path), self._arrays(), self._meta())
+
+    @classmethod
+    def load(cls, path: Path | str) -> "Dictionary":
+        """Read and check what `save` wrote; VisionError names the file, what is wrong with it, and the remedy."""
+        try:
+            arrays, meta = read_npz(Path(path), tuple(_ARRAYS))
+            return _restored(arrays, meta)
+        except VisionError as error:
+            remedy = "name another" if str(error) == "no such file" else _REMEDY
+            raise VisionError(f"{path}: {error}; {remedy}") from error
+
+    def _arrays(self) -> Arrays:
+        pca = {name: getattr(self.pca, name) for name in ("mean", "components", "variances")}
+        return {**pca, "codebook": self.codebook, "hits": self.hits}
+
+    def _meta(self) -> dict[str, Any]:
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "placerec": __version__,
+            "descriptor": asdict(self.spec),
+            "training": asdict(self.training),
+            "quality": asdict(self.quality),
+        }
+
+
+def _check(descriptors: NDArray[np.float32], spec: DescriptorSpec) -> NDArray[np.float32]:
+    rows = np.asarray(descriptors)
+    if rows.ndim != 2 or rows.dtype.kind not in "uif":
+        raise VisionError(f"descriptors are float32 (n, {spec.length}), and these are {rows.dtype} {rows.shape}")
+    if rows.shape[1] != spec.length:
+        raise VisionError(f"the descriptors have {rows.shape[1]} values, and the dictionary's have {spec.length}")
+    rows = rows.astype(np.float32, copy=False)
+    good = np.isfinite(rows).all(axis=1)
+    if not good.all():
+        raise VisionError(f"descriptor {int(good.argmin())} (from 0) holds NaN or infinite values; leave it out")
+    return rows
+
+
+def _restored(arrays: Arrays, meta: dict[str, Any]) -> Dictionary:
+    if meta.get("format") != FORMAT:
+        raise VisionError("it is not a dictionary of placerec")
+    if meta.get("version") != VERSION:
+        raise VisionError(f"it has format version {meta.get('version')}, and this placerec reads {VERSION}")
+    try:
+        spec, training = DescriptorSpec(**meta["descriptor"]), Training(**meta["training"])
+        quality = Quality(**meta["quality"])
+    except (KeyError, TypeError) as error:
+        raise VisionError(f"its meta is incomplete ({error})") from error
+    _check_arrays(arrays, {"d": spec.length, "k": len(arrays["components"]), "K": training.size**2})
+    pca = Pca(arrays["mean"], arrays["components"], arrays["variances"], quality.explained, quality.needed)
+    return Dictionary(spec, pca, arrays["codebook"], arrays["hits"], training, quality)
+
+
+def _check_arrays(arrays: Arrays, lengths: dict[str, int]) -> None:
+    for name, (dtype, axes) in _ARRAYS.items():
+        array, shape = arrays[name], tuple(lengths[axis] for axis in axes)
+        if array.dtype != dtype or array.shape != shape:
+            raise VisionError(
+                f"{name} is {array.dtype} {array.shape}, not {np.dtype(dtype)} {shape}, as its meta tells"
+            )
+        if not np.isfinite(array).all():
+            raise VisionError(f"{name} holds NaN or infinite values")
+    if arrays["hits"].min() < 0 or not arrays["hits"].any():
+        raise VisionError("hits holds no counts of frames")

@@ -1,0 +1,106 @@
+"""Principal components from one pass over the data: centred, not whitened (readings A26)."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import VisionError
+from placerec.vision import exact
+
+log = logging.getLogger(__name__)
+
+PROMISED = 0.99  # the share of the variance that the paper says its 80 components keep
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """What a PCA needs to know of n rows: their mean (d,) and their scatter about it (d, d), both float64."""
+
+    n: int
+    mean: NDArray[np.float64]
+    scatter: NDArray[np.float64]
+
+    @classmethod
+    def none(cls, width: int) -> "Moments":
+        """The moments of no rows at all."""
+        return cls(0, np.zeros(width), np.zeros((width, width)))
+
+    def updated(self, rows: NDArray[np.float32]) -> "Moments":
+        """The moments with rows (m, d) added, m <= exact.TERMS, by Chan's pairwise formula."""
+        m = len(rows)
+        values = rows.astype(np.float64)
+        mean = values.sum(axis=0) / m
+        n = self.n + m
+        step = mean - self.mean
+        between = np.outer(step, step) * (self.n * m / n)
+        return Moments(n, self.mean + step * (m / n), self.scatter + exact.gram(values - mean) + between)
+
+
+@dataclass(frozen=True, eq=False)
+class Pca:
+    """Mean float64 (d,), components float32 (k, d) in rows, their variances float32 (k,), largest first.
+
+    `explained`: the share of the variance that the k components keep; `needed`: how many would keep 99 %.
+    """
+
+    mean: NDArray[np.float64]
+    components: NDArray[np.float32]
+    variances: NDArray[np.float32]
+    explained: float
+    needed: int
+
+
+def moments(rows: NDArray[np.float32]) -> Moments:
+    """The moments of (n, d) float32 in one pass; rows may be a memory map."""
+    total = Moments.none(rows.shape[1])
+    for chunk in chunks(rows):
+        total = total.updated(chunk)
+    return total
+
+
+def chunks(rows: NDArray[np.float32]) -> Iterator[NDArray[np.float32]]:
+    """The rows in pieces of a fixed size, so that the order of every sum is fixed."""
+    for first in range(0, len(rows), exact.TERMS):
+        yield rows[first : first + exact.TERMS]
+
+
+def fit_pca(data: Moments, components: int = 80) -> Pca:
+    """The leading principal components: `components`, or as many as the data has (n - 1 or its numeric rank).
+
+    A component's sign is chosen so that its largest entry is positive. Entries are rounded to multiples of 2**-20
+    (about 1e-6): LAPACK's last bits depend on its threads, the words must not. Raises VisionError if the rows are
+    fewer than two or all equal.
+    """
+    if data.n < 2:
+        raise VisionError(f"PCA needs at least 2 descriptors, and there are {data.n}; name more images")
+    values, vectors = np.linalg.eigh(data.scatter / (data.n - 1))
+    values, vectors = np.maximum(values[::-1], 0), vectors[:, ::-1].T
+    floor = values[0] * max(data.n, len(values)) * np.finfo(np.float64).eps
+    rank = min(int((values > floor).sum()), data.n - 1)
+    if values[0] <= np.finfo(np.float64).eps * float(np.abs(data.mean).max()) ** 2:
+        raise VisionError(f"all {data.n} descriptors are equal, nothing can be learnt from them; name other images")
+    k = min(components, rank)
+    if k < components:
+        log.warning("PCA keeps %d components instead of %d: the %d descriptors have no more", k, components, data.n)
+    share = np.cumsum(values) / values.sum()
+    leading = vectors[:k]
+    largest = np.take_along_axis(leading, np.abs(leading).argmax(axis=1)[:, None], axis=1)
+    leading = exact.on_grid(leading * np.sign(largest))
+    explained = round(float(share[k - 1]), 9)
+    if explained < PROMISED:
+        log.warning("the %d components of the PCA keep %.1f %% of the variance", k, 100 * explained)
+    needed = int((share < PROMISED).sum()) + 1
+    return Pca(data.mean, leading.astype(np.float32), values[:k].astype(np.float32), explained, needed)
+
+
+def project(rows: NDArray[np.float32], pca: Pca) -> NDArray[np.float32]:
+    """Coordinates float32 (n, k) of rows (n, d); a row's are the same whatever other rows are there."""
+    grid = pca.components.T.astype(np.float64)
+    codes = np.empty((len(rows), len(pca.components)), np.float32)
+    for first in range(0, len(rows), exact.TERMS):
+        piece = slice(first, first + exact.TERMS)
+        codes[piece] = exact.product(rows[piece] - pca.mean, grid)
+    return codes

@@ -1,0 +1,64 @@
+"""npz files of plain arrays and one JSON string `meta`: no pickle, and the same content gives the same bytes."""
+
+import hashlib
+import json
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import VisionError
+from placerec.files import whole_file
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def write_npz(path: Path, arrays: Arrays, meta: dict[str, Any]) -> None:
+    """Write the arrays and `meta`, whole or not at all; OutputError if the file cannot be written."""
+    with whole_file(Path(path)) as partial, partial.open("wb") as file:
+        # An open file and not a name: numpy would add .npz to another suffix.
+        content: dict[str, Any] = {**arrays, "meta": np.array(_text(meta))}
+        np.savez(file, **content)
+
+
+def read_npz(path: Path, names: tuple[str, ...]) -> tuple[Arrays, dict[str, Any]]:
+    """The arrays called `names` and `meta`; nothing in the file is executed.
+
+    Raises VisionError without the file's name for anything that `write_npz` would not have written.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            damaged = archive.testzip()
+        if damaged is not None:
+            raise VisionError(f"the checksum of {damaged} is wrong")
+        with np.load(path, allow_pickle=False) as file:
+            missing = [name for name in (*names, "meta") if name not in file.files]
+            if missing:
+                raise VisionError(f"the array {missing[0]} is missing")
+            arrays = {name: file[name] for name in names}
+            meta = json.loads(str(file["meta"]))
+    except FileNotFoundError as error:
+        raise VisionError("no such file") from error
+    except zipfile.BadZipFile as error:
+        raise VisionError("it is not an npz file, or it is truncated") from error
+    except (OSError, EOFError, ValueError, zlib.error, NotImplementedError, RuntimeError, MemoryError) as error:
+        raise VisionError(f"it cannot be read: {error}") from error
+    if not isinstance(meta, dict):
+        raise VisionError("its meta is not a JSON object")
+    return arrays, meta
+
+
+def fingerprint(arrays: Arrays, meta: dict[str, Any]) -> str:
+    """SHA-256 over names, types, shapes and bytes of the arrays, and `meta`: 64 hexadecimal digits."""
+    digest = hashlib.sha256(_text(meta).encode())
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _text(meta: dict[str, Any]) -> str:
+    return json.dumps(meta, sort_keys=True, allow_nan=False)

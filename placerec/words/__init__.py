@@ -1,0 +1,30 @@
+"""Words as text: token streams, selection, sentences."""
+
+from placerec.words.selection import Selection, parse_selection, select, selector
+from placerec.words.sentences import (
+    Sentences,
+    format_sentences,
+    read_sentences,
+    sentences_per_place,
+    time_gaps,
+    visits,
+)
+from placerec.words.stream import WordStream, read_stream, read_vocabulary, write_stream, write_vocabulary
+
+__all__ = [
+    "Selection",
+    "Sentences",
+    "WordStream",
+    "format_sentences",
+    "parse_selection",
+    "read_sentences",
+    "read_stream",
+    "read_vocabulary",
+    "select",
+    "selector",
+    "sentences_per_place",
+    "time_gaps",
+    "visits",
+    "write_stream",
+    "write_vocabulary",
+]

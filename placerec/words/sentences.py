@@ -1,0 +1,76 @@
+"""Sentences: the selected words of one visit to a place, one visit a line (readings A7, A22).
+
+Grammar of `PLACE.txt`, plain SRILM text: `file = { word { " " word } NL }`.
+"""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import StreamError
+from placerec.files import read_text
+from placerec.words.selection import Selection, select
+from placerec.words.stream import WordStream, check_word
+
+# A pause this many times longer than the usual time between two frames ends a visit: the recorder was off.
+GAP_FACTOR = 10.0
+
+Sentences = list[list[str]]
+
+
+def time_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """bool (n,): whether a frame follows a pause of more than GAP_FACTOR times the median time between frames."""
+    steps = np.diff(times)
+    known = steps[np.isfinite(steps) & (steps > 0)]
+    gaps = np.zeros(len(times), bool)
+    if len(known):
+        gaps[1:] = np.nan_to_num(steps, nan=0.0) > GAP_FACTOR * np.median(known)
+    return gaps
+
+
+def visits(stream: WordStream, selection: Selection) -> list[tuple[str, list[str]]]:
+    """The labelled visits of a stream in order: place, and the selected words of the visit (perhaps none).
+
+    Selection runs over the whole sequence, as at test; then a visit ends where the label changes, at an unlabelled
+    frame and at a gap in time.
+    """
+    kept = select(stream.words, selection)
+    gaps = time_gaps(stream.times)
+    found: list[tuple[str, list[str]]] = []
+    before = ""
+    for i, place in enumerate(stream.places):
+        if place and (place != before or gaps[i]):
+            found.append((place, []))
+        if place and kept[i]:
+            found[-1][1].append(stream.words[i])
+        before = place
+    return found
+
+
+def sentences_per_place(streams: Iterable[WordStream], selection: Selection) -> dict[str, Sentences]:
+    """The sentences of every place in the streams, places in alphabetical order.
+
+    A place whose visits hold no selected word is there, with no sentence.
+    """
+    sentences: dict[str, Sentences] = {}
+    for stream in streams:
+        for place, words in visits(stream, selection):
+            sentences.setdefault(place, []).extend([words] if words else [])
+    return dict(sorted(sentences.items()))
+
+
+def format_sentences(sentences: Sequence[Sequence[str]]) -> str:
+    """The text of a sentence file."""
+    return "".join(" ".join(words) + "\n" for words in sentences)
+
+
+def read_sentences(path: Path | str) -> Sentences:
+    """The sentences of a text file, one a line; blank lines and comment lines (##) are none, as in SRILM."""
+    lines = read_text(Path(path), StreamError).removeprefix("\ufeff").split("\n")
+    return [
+        [check_word(path, i, word) for word in line.split()]
+        for i, line in enumerate(lines, start=1)
+        if line.strip() and not line.startswith("##")
+    ]

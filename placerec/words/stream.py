@@ -1,0 +1,143 @@
+"""Token streams: one visual word per frame, as a text file.
+
+Grammar of `NAME.tsv` (UTF-8, LF, tabs; readers need only the column `word`, and accept more columns in any order)::
+
+    file  = "frame" TAB "time" TAB "place" TAB "word" TAB "distance" NL { line }
+    line  = name TAB [ seconds ] TAB [ place ] TAB word TAB [ distance ] NL
+
+`time` is empty where the source has no time stamps, `place` where the frame has no label. Lines are in time order.
+A text of words without a header (separated by blanks or line ends) is read as a stream without times and labels.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import StreamError, at
+from placerec.files import read_text, write_text
+from placerec.frames.places import check_place
+
+COLUMNS = ("frame", "time", "place", "word", "distance")
+# SRILM gives these a meaning of their own, and skips lines that start with ##.
+RESERVED = ("<s>", "</s>", "<unk>", "-pau-")
+
+
+@dataclass(frozen=True)
+class WordStream:
+    """The words of one sequence, one per frame, in time order.
+
+    `times` float64 (n,) seconds, nan where unknown; `places` "" where unlabelled; `distances` float64 (n,) from the
+    descriptor to its unit, nan where unknown.
+    """
+
+    name: str
+    frames: tuple[str, ...] = field(repr=False)
+    times: NDArray[np.float64] = field(repr=False)
+    places: tuple[str, ...] = field(repr=False)
+    words: tuple[str, ...] = field(repr=False)
+    distances: NDArray[np.float64] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.words)
+
+    @staticmethod
+    def of(name: str, words: Sequence[str], places: Sequence[str] | None = None) -> "WordStream":
+        """A stream of bare words (and labels), as another tokeniser makes it."""
+        unknown = np.full(len(words), np.nan)
+        frames = tuple(str(i) for i in range(len(words)))
+        return WordStream(name, frames, unknown, tuple(places or [""] * len(words)), tuple(words), unknown)
+
+
+def format_seconds(time: float) -> str:
+    """Seconds as decimal text, "" for nan; to the microsecond, since stamps in epoch seconds hold noise beyond."""
+    return "" if math.isnan(time) else np.format_float_positional(time, precision=6, trim="-")
+
+
+def write_stream(stream: WordStream, path: Path | str) -> None:
+    """Write a token stream file, whole or not at all."""
+    lines = ["\t".join(COLUMNS)]
+    for frame, time, place, word, distance in zip(
+        stream.frames, stream.times, stream.places, stream.words, stream.distances, strict=True
+    ):
+        shown = "" if math.isnan(distance) else f"{distance:.6g}"
+        lines.append(f"{frame}\t{format_seconds(time)}\t{place}\t{word}\t{shown}")
+    write_text(Path(path), "\n".join(lines) + "\n")
+
+
+def read_stream(path: Path | str) -> WordStream:
+    """Read a token stream file, or a plain text of words.
+
+    Raises StreamError, naming the file, the line and the value, for what is not by the grammar.
+    """
+    path = Path(path)
+    lines = read_text(path, StreamError).removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
+    header = lines[0].split("\t")
+    name = path.name.removesuffix(".gz").removesuffix(
+        path.with_suffix("").suffix if path.suffix == ".gz" else path.suffix
+    )
+    if "word" not in header:
+        if len(header) > 1 or "frame" in header:
+            raise StreamError(at(path, 1, f"the header {lines[0]!r} has no column 'word'"))
+        return WordStream.of(name, [check_word(path, i, w) for i, line in enumerate(lines, 1) for w in line.split()])
+    rows = [(i, line.split("\t")) for i, line in enumerate(lines[1:], start=2) if line]
+    for i, fields in rows:
+        if len(fields) != len(header):
+            raise StreamError(at(path, i, f"{len(fields)} fields found, {len(header)} expected as in the header"))
+    column = {title: [fields[at_] for _, fields in rows] for at_, title in enumerate(header)}
+    line_numbers = [i for i, _ in rows]
+    for i, place in zip(line_numbers, column.get("place", []), strict=False):
+        if place and (reason := check_place(place)):
+            raise StreamError(at(path, i, f"place {place!r} {reason}; rename it"))
+    blank = [""] * len(rows)
+    return WordStream(
+        name,
+        tuple(column.get("frame", [str(i) for i in range(len(rows))])),
+        _numbers(path, line_numbers, "time", column.get("time", blank)),
+        tuple(column.get("place", blank)),
+        tuple(check_word(path, i, word) for i, word in zip(line_numbers, column["word"], strict=True)),
+        _numbers(path, line_numbers, "distance", column.get("distance", blank)),
+    )
+
+
+def check_word(path: Path | str, line: int, word: str) -> str:
+    """`word` if it can stand in sentences and ARPA files, else a StreamError with its position."""
+    if not word or word.split() != [word]:
+        raise StreamError(at(path, line, f"the word {word!r} is empty or holds white space"))
+    if word in RESERVED or word.startswith("##"):
+        raise StreamError(at(path, line, f"the word {word!r} has a meaning of its own in language models; rename it"))
+    return word
+
+
+def _numbers(path: Path, lines: Iterable[int], title: str, texts: Sequence[str]) -> NDArray[np.float64]:
+    numbers = np.full(len(texts), np.nan)
+    for row, (i, text) in enumerate(zip(lines, texts, strict=True)):
+        try:
+            numbers[row] = float(text) if text else np.nan
+        except ValueError:
+            raise StreamError(at(path, i, f"{title} {text!r} is not a number")) from None
+    return numbers
+
+
+def read_vocabulary(path: Path | str) -> tuple[str, ...]:
+    """The words of a vocab.txt, one a line, in its order; StreamError for an empty file or a word listed twice."""
+    lines = read_text(Path(path), StreamError).removeprefix("\ufeff").splitlines()
+    words: dict[str, int] = {}
+    for i, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        word = check_word(path, i, line.strip())
+        if word in words:
+            raise StreamError(at(path, i, f"the word {word!r} is listed already, on line {words[word]}"))
+        words[word] = i
+    if not words:
+        raise StreamError(f"{path}: holds no word; one word a line is expected")
+    return tuple(words)
+
+
+def write_vocabulary(words: Iterable[str], path: Path | str) -> None:
+    """Write a vocab.txt: one word a line."""
+    write_text(Path(path), "".join(f"{word}\n" for word in words))

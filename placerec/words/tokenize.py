@@ -1,0 +1,70 @@
+"""From images to token streams: the word of every frame."""
+
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from placerec.files import whole_folder, write_text
+from placerec.frames import find_sequences
+from placerec.version import __version__
+from placerec.vision import Descriptors, Dictionary, describe
+from placerec.words.stream import WordStream, write_stream, write_vocabulary
+
+OWNED = ("*.tsv", "vocab.txt", "tokens.json")
+
+
+def tokenize(
+    sources: Iterable[Path | str],
+    words: Path | str,
+    out: Path | str,
+    *,
+    format: str = "auto",
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """`placerec tokenize`: write the tokens folder `out` (one .tsv per sequence, vocab.txt) of image sources.
+
+    `words`: the words.npz to use. tokens.json names its fingerprint, so that models know what they were trained on.
+    """
+    dictionary = Dictionary.load(Path(words))
+    write_tokens(streams_of(sources, dictionary, format=format, progress=progress), dictionary, Path(out))
+
+
+def streams_of(
+    sources: Iterable[Path | str],
+    dictionary: Dictionary,
+    *,
+    format: str = "auto",
+    progress: Callable[[int, int], None] | None = None,
+) -> list[WordStream]:
+    """The token streams of image sources: each frame's best-matching unit in `dictionary`."""
+    sequences = find_sequences(sources, format=format)
+    return tokens_of(describe(sequences, dictionary.spec, progress=progress), dictionary)
+
+
+def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStream]:
+    """The token streams of described frames, one per sequence."""
+    units, distances = dictionary.words(descriptors.values)
+    vocabulary = dictionary.vocabulary
+    streams = []
+    for name, rows in descriptors.rows_by_sequence().items():
+        streams.append(
+            WordStream(
+                name,
+                tuple(descriptors.frames[row] for row in rows),
+                descriptors.times[rows],
+                tuple(descriptors.places[row] for row in rows),
+                tuple(vocabulary[unit] for unit in units[rows].tolist()),
+                distances[rows].astype(float),
+            )
+        )
+    return streams
+
+
+def write_tokens(streams: Iterable[WordStream], dictionary: Dictionary, out: Path) -> None:
+    """Write the tokens folder `out`, whole or not at all."""
+    with whole_folder(out, OWNED) as folder:
+        for stream in streams:
+            write_stream(stream, folder / f"{stream.name}.tsv")
+        write_vocabulary(dictionary.vocabulary, folder / "vocab.txt")
+        description = {"format": "placerec tokens 1", "version": __version__, "dictionary": dictionary.fingerprint}
+        write_text(folder / "tokens.json", json.dumps(description, indent=2) + "\n")

@@ -1,0 +1,256 @@
+"""Every kind of image that is read, and every kind of damage that is named; nothing is written to stderr."""
+
+import struct
+import subprocess
+import sys
+import threading
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from placerec.errors import SourceError
+from placerec.frames import read_gray
+
+GRAY = cv2.resize(np.random.default_rng(1).integers(0, 256, (6, 8), np.uint8), (64, 48), interpolation=cv2.INTER_CUBIC)
+COLOUR = np.dstack([GRAY, GRAY[::-1], GRAY[:, ::-1]])
+
+
+@pytest.fixture(autouse=True)
+def _silence(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
+    """The codecs write to the descriptor, past sys.stderr."""
+    yield
+    assert capfd.readouterr() == ("", "")
+
+
+def encode(suffix: str, pixels: NDArray[Any], *options: int) -> bytes:
+    ok, data = cv2.imencode(suffix, pixels, options)
+    assert ok
+    return data.tobytes()
+
+
+def write(path: Path, data: bytes) -> Path:
+    path.write_bytes(data)
+    return path
+
+
+def failure(path: Path) -> str:
+    with pytest.raises(SourceError) as error:
+        read_gray(path)
+    message = str(error.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    return message.removeprefix(f"{path}: ")
+
+
+def chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def exif(orientation: int) -> bytes:
+    return b"II*\0\x08\0\0\0\x01\0" + struct.pack("<HHIHHI", 0x112, 3, 1, orientation, 0, 0)
+
+
+def segment(marker: int, data: bytes) -> bytes:
+    return struct.pack(">BBH", 0xFF, marker, len(data) + 2) + data
+
+
+@pytest.mark.parametrize("suffix", [".png", ".bmp", ".tif", ".pgm", ".ppm"])
+def test_lossless_formats(tmp_path: Path, suffix: str) -> None:
+    pixels = COLOUR if suffix == ".ppm" else GRAY
+    image = read_gray(write(tmp_path / f"a{suffix}", encode(suffix, pixels)))
+    assert image.dtype == np.uint8
+    if suffix == ".ppm":
+        luma = COLOUR @ np.array([0.114, 0.587, 0.299])
+        assert np.abs(image - luma).max() <= 1
+    else:
+        np.testing.assert_array_equal(image, GRAY)
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".webp"])
+def test_lossy_formats(tmp_path: Path, suffix: str) -> None:
+    image = read_gray(write(tmp_path / f"a{suffix}", encode(suffix, GRAY)))
+    assert image.shape == GRAY.shape
+    assert np.abs(image.astype(float) - GRAY).mean() < 5
+
+
+def test_the_path_is_opencvs_gray(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.jpeg", encode(".jpg", COLOUR))
+    np.testing.assert_array_equal(read_gray(path), cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
+
+
+def test_suffix_does_not_matter(tmp_path: Path) -> None:
+    np.testing.assert_array_equal(read_gray(write(tmp_path / "a.jpeg", encode(".png", GRAY))), GRAY)
+
+
+@pytest.mark.parametrize("scale", [1, 257])
+def test_alpha_is_ignored(tmp_path: Path, scale: int) -> None:
+    colour = COLOUR * np.uint16(scale) if scale > 1 else COLOUR
+    alpha = np.dstack([colour, colour[..., 2]])
+    plain = read_gray(write(tmp_path / "a.png", encode(".png", colour)))
+    np.testing.assert_array_equal(read_gray(write(tmp_path / "b.png", encode(".png", alpha))), plain)
+
+
+def test_gray_with_alpha(tmp_path: Path) -> None:
+    pixels = np.full((10, 9, 2), (200, 0), np.uint8)
+    rows = b"".join(b"\0" + row.tobytes() for row in pixels)
+    header = struct.pack(">IIBBBBB", 9, 10, 8, 4, 0, 0, 0)
+    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    np.testing.assert_array_equal(read_gray(write(tmp_path / "a.png", data)), np.full((10, 9), 200))
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".pgm"])
+@pytest.mark.parametrize("bits", [8, 10, 12, 14, 16])
+def test_sixteen_bits_of_any_depth(tmp_path: Path, suffix: str, bits: int) -> None:
+    top = 2**bits - 1
+    pixels = np.round(GRAY * (top / 255)).astype(np.uint16)
+    pixels[0, 0] = top
+    image = read_gray(write(tmp_path / f"a{suffix}", encode(suffix, pixels)))
+    assert image.dtype == np.float32
+    np.testing.assert_allclose(image, pixels * (255 / top), rtol=1e-6)
+    assert image.max() == 255
+
+
+@pytest.mark.parametrize(("peak", "top"), [(255, 255), (256, 1023), (1023, 1023), (1024, 4095), (16384, 65535)])
+def test_depth_is_the_least_that_holds_the_peak(tmp_path: Path, peak: int, top: int) -> None:
+    image = read_gray(write(tmp_path / "a.png", encode(".png", np.full((8, 8), peak, np.uint16))))
+    np.testing.assert_allclose(image, peak * 255 / top, rtol=1e-6)
+
+
+def test_sixteen_bits_of_black(tmp_path: Path) -> None:
+    image = read_gray(write(tmp_path / "a.png", encode(".png", np.zeros((8, 8), np.uint16))))
+    np.testing.assert_array_equal(image, np.zeros((8, 8)))
+
+
+@pytest.mark.parametrize("kind", ["jpeg", "png"])
+def test_orientation_is_applied(tmp_path: Path, kind: str) -> None:
+    data = encode(".jpg" if kind == "jpeg" else ".png", GRAY)
+    if kind == "jpeg":
+        turned = data[:2] + segment(0xE1, b"Exif\0\0" + exif(6)) + data[2:]
+    else:
+        turned = data[:33] + chunk(b"eXIf", exif(6)) + data[33:]
+    plain = read_gray(write(tmp_path / "a", data))
+    np.testing.assert_array_equal(read_gray(write(tmp_path / "b", turned)), np.rot90(plain, -1))
+
+
+@pytest.mark.parametrize(
+    "tag", [chunk(b"gAMA", struct.pack(">I", 45455)), chunk(b"sRGB", b"\0"), chunk(b"iCCP", b"x\0\0?")]
+)
+def test_colour_tags_of_png_change_nothing(tmp_path: Path, tag: bytes) -> None:
+    data = encode(".png", COLOUR)
+    plain = read_gray(write(tmp_path / "a.png", data))
+    np.testing.assert_array_equal(read_gray(write(tmp_path / "b.png", data[:33] + tag + data[33:])), plain)
+
+
+@pytest.mark.parametrize("trailer", [b"\0" * 4096, b"\xff" * 16, b"\r\n", b"\xff\xd8\xff\xe1 a second picture"])
+def test_jpeg_may_be_padded(tmp_path: Path, trailer: bytes) -> None:
+    data = encode(".jpg", COLOUR)
+    plain = read_gray(write(tmp_path / "a.jpg", data))
+    np.testing.assert_array_equal(read_gray(write(tmp_path / "b.jpg", data + trailer)), plain)
+
+
+@pytest.mark.parametrize("options", [(cv2.IMWRITE_JPEG_PROGRESSIVE, 1), (cv2.IMWRITE_JPEG_RST_INTERVAL, 2)])
+def test_jpeg_of_several_scans_and_restarts(tmp_path: Path, options: tuple[int, int]) -> None:
+    data = encode(".jpg", COLOUR, *options)
+    assert data.count(b"\xff\xda") > 1 or b"\xff\xd0" in data
+    assert read_gray(write(tmp_path / "a.jpg", data)).shape == GRAY.shape
+    assert "truncated" in failure(write(tmp_path / "b.jpg", data[:-2]))
+
+
+def test_jpeg_with_filling_or_garbage_before_a_marker(tmp_path: Path) -> None:
+    data = encode(".jpg", COLOUR)
+    plain = read_gray(write(tmp_path / "a.jpg", data))
+    np.testing.assert_array_equal(read_gray(write(tmp_path / "b.jpg", data[:2] + b"\xff\xff\xff" + data[2:])), plain)
+    table = data.index(b"\xff\xdb")
+    message = failure(write(tmp_path / "c.jpg", data[:table] + bytes(7) + data[table:]))
+    assert message == "JPEG is truncated or damaged (no end marker); copy it again or remove it"
+
+
+def test_truncated_jpeg_of_any_length(tmp_path: Path) -> None:
+    data = encode(".jpg", COLOUR)
+    thumbnail = data[:2] + segment(0xE1, b"Exif\0\0" + encode(".jpg", GRAY)) + data[2:]
+    for whole in (data, thumbnail):
+        for length in range(4, len(whole) - 1, 41):
+            message = failure(write(tmp_path / "a.jpeg", whole[:length]))
+            assert message == "JPEG is truncated or damaged (no end marker); copy it again or remove it"
+
+
+def test_truncated_png_of_any_length(tmp_path: Path) -> None:
+    data = encode(".png", COLOUR)
+    for length in [*range(8, len(data) - 12, 101), len(data) - 12, len(data) - 1]:
+        message = failure(write(tmp_path / "a.png", data[:length]))
+        assert message == "PNG is truncated (no IEND); copy it again or remove it"
+
+
+def test_damaged_png(tmp_path: Path) -> None:
+    data = bytearray(encode(".png", COLOUR))
+    data[len(data) // 2] ^= 1
+    message = failure(write(tmp_path / "a.png", bytes(data)))
+    assert message == "PNG is damaged (checksum of IDAT); copy it again or remove it"
+
+
+@pytest.mark.parametrize("suffix", [".bmp", ".tif", ".pgm", ".webp"])
+def test_other_truncated_formats(tmp_path: Path, suffix: str) -> None:
+    data = encode(suffix, GRAY)
+    message = failure(write(tmp_path / f"a{suffix}", data[: len(data) // 2]))
+    assert message == "is no image that OpenCV can decode; copy it again or remove it"
+
+
+def test_files_that_are_no_images(tmp_path: Path) -> None:
+    assert failure(tmp_path / "absent.png") == "no such file"
+    (tmp_path / "folder.png").mkdir()
+    assert failure(tmp_path / "folder.png") == "cannot be read: Is a directory"
+    assert failure(write(tmp_path / "empty.png", b"")) == "is empty; copy it again or remove it"
+    undecodable = "is no image that OpenCV can decode; copy it again or remove it"
+    assert failure(write(tmp_path / "text.jpeg", b"This is text.\n")) == undecodable
+    assert failure(write(tmp_path / "zeros.jpeg", bytes(5000))) == undecodable
+
+
+@pytest.mark.parametrize(("height", "width"), [(1, 1), (7, 100), (100, 7)])
+def test_too_small(tmp_path: Path, height: int, width: int) -> None:
+    path = write(tmp_path / "a.png", encode(".png", np.zeros((height, width), np.uint8)))
+    assert failure(path) == f"is {width}x{height} pixels, and 8 a side are needed; remove it"
+
+
+def test_smallest(tmp_path: Path) -> None:
+    assert read_gray(write(tmp_path / "a.png", encode(".png", GRAY[:8, :8]))).shape == (8, 8)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int16])
+def test_pixels_of_other_types(tmp_path: Path, kind: type[np.number[Any]]) -> None:
+    pixels = GRAY.astype(kind)
+    if kind is np.float32:
+        pixels[0, 0] = np.nan
+    name = np.dtype(kind).name
+    message = failure(write(tmp_path / "a.tif", encode(".tif", pixels)))
+    assert message == f"has pixels of type {name}; save it with 8 or 16 bits a channel"
+
+
+def test_a_header_that_promises_too_much(tmp_path: Path) -> None:
+    data = encode(".png", GRAY)
+    header = struct.pack(">II", 100_000, 100_000) + data[24:29]
+    message = failure(write(tmp_path / "a.png", data[:8] + chunk(b"IHDR", header) + data[33:]))
+    assert message.startswith("OpenCV refuses it (")
+
+
+def test_the_log_level_is_restored_by_the_last_of_many_threads(tmp_path: Path) -> None:
+    from cv2.utils import logging as cv2_log
+
+    before = cv2_log.getLogLevel()
+    path = write(tmp_path / "a.bmp", encode(".bmp", GRAY)[:500])
+    threads = [threading.Thread(target=lambda: [failure(path) for _ in range(50)]) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert cv2_log.getLogLevel() == before != cv2_log.LOG_LEVEL_SILENT
+
+
+def test_finding_sequences_does_not_import_opencv() -> None:
+    code = "import sys, placerec.frames; sys.exit('cv2' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,122 @@
+"""Estimation: the reference trainer's files to the byte, the plain twin's numbers, and sums of 1."""
+
+import itertools
+from pathlib import Path
+
+import golden
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from placerec import reference
+from placerec.errors import LanguageModelError
+from placerec.lm import SMOOTHINGS, BackoffModel, count_ngrams, estimate, format_arpa, smoothing
+from placerec.lm.checks import context_sums
+
+VOCABULARY = ["a", "b", "c", "d", "e"]
+CLOSED_SMOOTHINGS = {
+    "witten-bell-interpolate": ("witten-bell", 1.0),
+    "witten-bell-no-interpolate": ("witten-bell-backoff", 1.0),
+    "lidstone-1-no-interpolate": ("lidstone-backoff", 1.0),
+    "lidstone-0.5-no-interpolate": ("lidstone-backoff", 0.5),
+}
+sentences_of_words = st.lists(st.lists(st.sampled_from(["a", "b", "c", "d"]), min_size=1, max_size=12), max_size=6)
+
+
+def closed_model(
+    sentences: list[list[str]], name: str, order: int, delta: float = 1.0, min_count: tuple[int, ...] = (1,)
+) -> BackoffModel:
+    counts = count_ngrams(sentences, order, vocabulary=VOCABULARY, markers=False)
+    return estimate(counts, smoothing(name, delta), non_events=["</s>"], min_count=min_count)
+
+
+def test_place_models_equal_the_reference_trainers(shared: Path) -> None:
+    files = sorted((shared / "srilm/closed").glob("*/expected/*/*.arpa"))
+    assert len(files) > 100
+    for path in files:
+        root = path.parents[2]
+        kind, order, markers = path.parent.name.split("_")
+        name, delta = CLOSED_SMOOTHINGS[kind]
+        sentences = [line.split() for line in (root / f"sentences/{path.stem}.txt").read_text().splitlines()]
+        vocabulary = (root / "vocab.txt").read_text().split()
+        counts = count_ngrams(
+            sentences, int(order.removeprefix("order-")), vocabulary=vocabulary, markers=markers == "markers"
+        )
+        model = estimate(counts, smoothing(name, delta), non_events=[] if markers == "markers" else ["</s>"])
+        assert format_arpa(model) == path.read_text(), path
+
+
+def test_text_models_equal_the_reference_trainers(shared: Path) -> None:
+    cases = list(golden.text_cases(shared / "srilm/golden"))
+    assert len(cases) > 70
+    for case in cases:
+        counts = count_ngrams(case.sentences, case.order, vocabulary=case.vocabulary, markers=case.markers)
+        model = estimate(
+            counts,
+            case.smoothing,
+            min_count=case.min_count,
+            non_events=case.non_events,
+            open_vocabulary=case.unknown_is_word,
+        )
+        assert format_arpa(model) == case.expected, case.name
+
+
+@pytest.mark.parametrize("name", SMOOTHINGS)
+@settings(max_examples=40, deadline=None)
+@given(sentences=sentences_of_words, order=st.integers(1, 5), delta=st.sampled_from([0.1, 1.0, 3.0]))
+def test_probabilities_are_those_of_the_plain_twin(
+    name: str, sentences: list[list[str]], order: int, delta: float
+) -> None:
+    model = closed_model(sentences, name, order, delta)
+    twin = reference.smoothed(reference.count(sentences, order), VOCABULARY, order, name, delta)
+    for history in [(), ("a",), ("e",), ("a", "b"), ("b", "a", "c"), ("c", "a", "b", "d")]:
+        for word in VOCABULARY:
+            wanted = reference.backed_off(twin, word, history[-(order - 1) :] if order > 1 else ())
+            assert 10 ** model.log10_p(word, history) == pytest.approx(wanted, rel=3e-5), (word, history)
+
+
+@pytest.mark.parametrize("name", SMOOTHINGS)
+@settings(max_examples=40, deadline=None)
+@given(
+    sentences=sentences_of_words,
+    order=st.integers(1, 6),
+    min_count=st.sampled_from([(1,), (1, 1, 2), (2,), (1, 3, 1)]),
+)
+def test_every_context_sums_to_one_and_no_word_is_impossible(
+    name: str, sentences: list[list[str]], order: int, min_count: tuple[int, ...]
+) -> None:
+    model = closed_model(sentences, name, order, min_count=min_count)
+    for n, _, sums in context_sums(model):
+        assert np.abs(sums - 1).max(initial=0) < 1e-5, n
+    for history in itertools.chain([()], itertools.product(VOCABULARY, repeat=2)):
+        log10_ps = [model.log10_p(word, history) for word in VOCABULARY]
+        assert min(log10_ps) > -20
+        assert sum(10**p for p in log10_ps) == pytest.approx(1, abs=1e-5), history
+
+
+def test_witten_bell_by_hand() -> None:
+    # "a b a", V = 5 (the words), N = 3, T = 2: p(a) = (2 + 2/5) / 5, p(c) = (0 + 2/5) / 5.
+    model = closed_model([["a", "b", "a"]], "witten-bell", 2)
+    assert 10 ** model.log10_p("a") == pytest.approx(2.4 / 5, rel=1e-6)
+    assert 10 ** model.log10_p("c") == pytest.approx(0.4 / 5, rel=1e-6)
+    # After a (N = 1, T = 1): p(b|a) = (1 + p(b)) / 2 with p(b) = 1.4/5, and p(c|a) = p(c) / 2.
+    assert 10 ** model.log10_p("b", ["a"]) == pytest.approx((1 + 1.4 / 5) / 2, rel=1e-6)
+    assert 10 ** model.log10_p("c", ["a"]) == pytest.approx(0.08 / 2, rel=1e-6)
+
+
+def test_a_place_without_words_is_uniform() -> None:
+    model = closed_model([], "witten-bell", 3)
+    assert [10 ** model.log10_p(word) for word in VOCABULARY] == pytest.approx([0.2] * 5, rel=1e-6)
+
+
+def test_wrong_options_are_named() -> None:
+    counts = count_ngrams([["a"]], 2, vocabulary=VOCABULARY, markers=False)
+    with pytest.raises(LanguageModelError, match=r"^smoothing 'kneser' is unknown; choose one of witten-bell, "):
+        smoothing("kneser")
+    with pytest.raises(LanguageModelError, match=r"^delta 0 must be a number above 0"):
+        smoothing("lidstone", 0)
+    with pytest.raises(LanguageModelError, match=r"^minimum counts \(0,\) must be 1 or more"):
+        estimate(counts, smoothing("lidstone"), min_count=(0,))
+    with pytest.raises(LanguageModelError, match="holds no word that could be predicted"):
+        estimate(counts, smoothing("lidstone"), non_events=[*VOCABULARY, "</s>"])

@@ -1,0 +1,66 @@
+"""Inspection: numbers that can be added up by hand."""
+
+from pathlib import Path
+
+import pytest
+
+from placerec.errors import LanguageModelError
+from placerec.lm.inspection import format_inspection, inspect_model
+
+ARPA = """# made by hand
+\\data\\
+ngram 1=4
+ngram 2=2
+
+\\1-grams:
+-99\t<s>
+-0.5\ta\t-0.2
+-0.3\tb\t-0.1
+-1\tc
+
+\\2-grams:
+-0.4\ta b
+-0.6\tb a
+
+\\end\\
+"""
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    path = tmp_path / "place.arpa"
+    path.write_text(ARPA)
+    return path
+
+
+def test_steps_add_up(model: Path) -> None:
+    found = inspect_model(model, ["a b", "b a c", "c a"])
+    listed, backed_off, unknown_context = found["explained"]
+    assert listed["log10_p"] == pytest.approx(-0.4)
+    # Order 2 looks one word back: a c is not listed, so weight(a) + log10 p(c) = -0.2 - 1.
+    assert backed_off["history"] == ["a"]
+    assert backed_off["log10_p"] == pytest.approx(-1.2)
+    assert [step["found"] for step in backed_off["steps"]] == [False, True]
+    # c is no context of the model: nothing to pay for leaving it.
+    assert unknown_context["log10_p"] == pytest.approx(-0.5)
+    assert unknown_context["steps"][0]["context_listed"] is False
+
+
+def test_text_shows_the_sum(model: Path) -> None:
+    text = format_inspection(inspect_model(model, ["b a c"]))
+    assert "# made by hand" in text
+    assert "4 of order 1, 2 of order 2" in text
+    assert "'a c' is not listed: back off from 'a', weight -0.2" in text
+    assert "log10 p = -0.2 + -1 = -1.2, p = 0.06309573" in text
+
+
+def test_most_frequent_by_joint_probability(model: Path) -> None:
+    one, two = inspect_model(model, top=2)["most_frequent"]
+    assert [entry["ngram"] for entry in one] == ["b", "a"]
+    # p(a) p(b|a) = 10^-0.9, p(b) p(a|b) = 10^-0.9: equal, so the order of the words decides.
+    assert [entry["p"] for entry in two] == pytest.approx([10**-0.9] * 2, rel=1e-6)
+
+
+def test_words_that_are_not_listed_are_named(model: Path) -> None:
+    with pytest.raises(LanguageModelError, match="the word 'zebra' is not in the model"):
+        inspect_model(model, ["a zebra"])

@@ -1,0 +1,79 @@
+"""KenLM as the independent check: it loads every file in silence and gives every token the same probability."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from placerec.errors import LanguageModelError, MissingExtraError
+from placerec.lm import SMOOTHINGS, count_ngrams, estimate, read_arpa, smoothing, with_unigrams, write_arpa
+from placerec.lm.checks import check_model, generated_stream
+from placerec.lm.external import kenlm_scorer
+
+WORDS = [f"w{i:02d}" for i in range(30)]
+
+
+def write_model(path: Path, name: str, order: int, *, markers: bool = False, seed: int = 0) -> Path:
+    generator = np.random.default_rng(seed)
+    walk = np.cumsum(generator.integers(-1, 2, 400)) % 20
+    sentences = [[WORDS[i] for i in walk[start : start + 50]] for start in range(0, 400, 50)]
+    counts = count_ngrams(sentences, order, vocabulary=WORDS, markers=markers)
+    model = estimate(counts, smoothing(name), non_events=[] if markers else ["</s>"])
+    write_arpa(with_unigrams(model, ["<unk>", "<s>", "</s>"]), path, comment="made by a test")
+    return path
+
+
+@pytest.mark.parametrize("markers", [False, True])
+@pytest.mark.parametrize("order", range(1, 7))
+@pytest.mark.parametrize("name", SMOOTHINGS)
+def test_kenlm_agrees_in_silence(
+    name: str, order: int, markers: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("kenlm", reason="KenLM is not installed here")
+    path = write_model(tmp_path / "model.arpa", name, order, markers=markers)
+    found = check_model(path)
+    # C++ writes past sys.stderr: the file descriptors are what counts.
+    assert capfd.readouterr() == ("", "")
+    assert found.ok, found.sentence()
+    assert found.tokens == 2000
+    assert found.largest_difference is not None
+    assert found.largest_difference <= 2e-6
+
+
+def test_generated_streams_reach_every_order(tmp_path: Path) -> None:
+    from placerec.lm.backoff import score_ids
+
+    model = read_arpa(write_model(tmp_path / "model.arpa", "witten-bell", 4))
+    words = generated_stream(model, 2000)
+    _, answered = score_ids(model, model.ids(words))
+    assert set(answered.tolist()) == {1, 2, 3, 4}
+
+
+def test_check_sees_a_wrong_probability(tmp_path: Path) -> None:
+    pytest.importorskip("kenlm", reason="KenLM is not installed here")
+    path = write_model(tmp_path / "model.arpa", "witten-bell", 2)
+    lines = path.read_text().split("\n")
+    at = next(i for i, line in enumerate(lines) if line.endswith("\tw03 w04"))
+    lines[at] = "-0.0001\tw03 w04"
+    path.write_text("\n".join(lines))
+    found = check_model(path)
+    assert not found.ok
+    assert found.worst_context == "w03"
+    assert "FAIL (worst context: w03)" in found.sentence()
+
+
+def test_order_seven_is_summed_but_not_compared(tmp_path: Path) -> None:
+    path = write_model(tmp_path / "model.arpa", "witten-bell", 7)
+    found = check_model(path)
+    assert found.ok
+    assert found.largest_difference is None
+    with pytest.raises(LanguageModelError, match="order 7; KenLM scores orders up to 6; use the native scorer"):
+        kenlm_scorer(path)
+
+
+def test_without_kenlm_the_message_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_model(tmp_path / "model.arpa", "witten-bell", 2)
+    monkeypatch.setitem(sys.modules, "kenlm", None)
+    with pytest.raises(MissingExtraError, match=r"needs the package kenlm, which is not installed: pip install kenlm"):
+        check_model(path)
