@@ -2,7 +2,6 @@
 
 import logging
 import os
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 from placerec.errors import SourceError
 from placerec.frames.cold import CAMERA, LIST_FOLDER, find_list, parse_name
 from placerec.frames.folder import WANTED, list_folder, read_frames
+from placerec.frames.naming import unique_names
 from placerec.frames.places import PlaceList, check_place, check_twins, read_places
 from placerec.frames.sequence import Sequence
 
@@ -44,7 +44,7 @@ def find_sequences(sources: Iterable[Path | str], *, format: str = "auto") -> li
     paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
     found = [item for path in paths for item in _in_source(path, format)]
     _check_twice(found)
-    names = _names(found)
+    names = unique_names([(_absolute(item.folder).name, item.folder) for item in found], SourceError)
     labels = [read_places(item.places, frozenset(item.images)) if item.places else None for item in found]
     check_twins(_positions(found, labels))
     return [
@@ -158,26 +158,6 @@ def _positions(found: list[_Found], labels: list[PlaceList | None]) -> Iterator[
             yield item.place, str(item.folder)
         elif its:
             yield from ((place, f"{its.path}:{its.lines[image]}") for image, place in its.places.items())
-
-
-def _names(found: list[_Found]) -> list[str]:
-    own = [_absolute(item.folder).name for item in found]
-    count = Counter(own)
-    names = [_with_parent(item.folder) if count[name] > 1 else name for name, item in zip(own, found, strict=True)]
-    seen: dict[str, Path] = {}
-    for name, item in zip(names, found, strict=True):
-        first = seen.setdefault(name, item.folder)
-        if first is not item.folder:
-            raise SourceError(f"{item.folder}: is named {name}, as {first} is; rename one of the folders")
-    return names
-
-
-def _with_parent(folder: Path) -> str:
-    folder = _absolute(folder)
-    # Past the second folder of the same name that some archives unpack to: the name is wanted, not its echo.
-    while folder.parent.name == folder.name != "":
-        folder = folder.parent
-    return f"{folder.parent.name}-{folder.name}"
 
 
 def _absolute(path: Path) -> Path:

@@ -4,6 +4,7 @@ Depths are perpendicular to the picture (no fisheye); rays are (1, k) with k the
 as one map of atlas positions and sampled once, which is what makes it quick.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -52,25 +53,26 @@ class _Frame:
 def look(scene: Scene, cam: Camera, pose: tuple[float, float, float]) -> NDArray[np.uint8]:
     """The picture (height, width, 3) uint8 RGB seen from pose (x, y, heading in radians), coded as the atlas is."""
     x, y, a = pose
-    turn = np.array([[np.cos(a), np.sin(a)], [np.sin(a), -np.cos(a)]])
+    turn = np.array([[np.cos(a), np.sin(a)], [np.sin(a), -np.cos(a)]], np.float32)
     standing, level = (_seen_from(p, np.array([x, y]), turn) for p in (scene.upright, scene.level))
-    frame = _uprights(scene, cam, standing, level)
+    frame = _cast(scene, cam, standing, level)
     picture = cv2.remap(scene.atlas, frame.u, frame.v, cv2.INTER_LINEAR)
     small = cv2.resize(picture, (cam.width, cam.height), interpolation=cv2.INTER_AREA)
     return np.asarray(small, np.uint8)
 
 
-def _seen_from(panels: Panels, position: NDArray[np.float64], turn: NDArray[np.float64]) -> Panels:
+def _seen_from(panels: Panels, position: NDArray[np.float64], turn: Array) -> Panels:
     """The panels with x, y replaced by depth and offset to the right."""
-    way = turn.T.astype(np.float32)
-    corner, across, down = panels.corner.copy(), panels.across.copy(), panels.down.copy()
-    corner[:, :2] = (corner[:, :2] - position.astype(np.float32)) @ way
-    across[:, :2] = across[:, :2] @ way
-    down[:, :2] = down[:, :2] @ way
-    return Panels(corner, across, down, panels.spot)
+    edges = np.stack([panels.corner, panels.across, panels.down])
+    edges[0, :, :2] -= position.astype(np.float32)
+    x, y = edges[..., 0].copy(), edges[..., 1].copy()
+    for i in (0, 1):
+        edges[..., i] = turn[i, 0] * x + turn[i, 1] * y
+    return Panels(edges[0], edges[1], edges[2], panels.spot)
 
 
-def _uprights(scene: Scene, cam: Camera, standing: Panels, level: Panels) -> _Frame:
+def _cast(scene: Scene, cam: Camera, standing: Panels, level: Panels) -> _Frame:
+    """What every ray hits: walls first, then level panels, then what stands before them."""
     start, edge = standing.corner[:, :2], standing.across[:, :2]
     # Seen from its front, a panel's start is on the left.
     facing = (start[:, 0] * edge[:, 1] - start[:, 1] * edge[:, 0] > 0) & (
@@ -79,16 +81,16 @@ def _uprights(scene: Scene, cam: Camera, standing: Panels, level: Panels) -> _Fr
     index = np.flatnonzero(facing)
     p, e, k = start[index][:, :, None], edge[index][:, :, None], cam.columns
     slope = e[:, 1] - k * e[:, 0]
-    along = (k * p[:, 0] - p[:, 1]) / np.where(np.abs(slope) < 1e-9, np.float32(1e-9), slope)
-    depth = p[:, 0] + along * e[:, 0]
+    along = np.asarray((k * p[:, 0] - p[:, 1]) / np.where(np.abs(slope) < 1e-9, np.float32(1e-9), slope), np.float32)
+    depth = np.asarray(p[:, 0] + along * e[:, 0], np.float32)
     depth[(along < 0) | (along > 1) | (depth < NEAR)] = FAR
     walls = np.flatnonzero(scene.closed[index])
     nearest = walls[np.argmin(depth[walls], axis=0)]
     column = np.arange(len(k))
     frame = _walls(scene, cam, standing, index[nearest], along[nearest, column], depth[nearest, column])
     reach = frame.depth[0].copy()
-    for i in range(len(level.corner)):
-        _draw_level(frame, cam, level, i, scene.res, reach)
+    for i, part, rows in _levels_in_view(cam, level, float(reach.max())):
+        _draw_level(frame, cam, level, i, scene.res, part, rows)
     before = (depth < reach) & ~scene.closed[index][:, None]
     for row in np.flatnonzero(before.any(axis=1)):
         hit = np.flatnonzero(before[row])
@@ -126,43 +128,43 @@ def _draw_upright(
     np.copyto(frame.depth[rows, part], depth, where=seen)
 
 
-def _draw_level(frame: _Frame, cam: Camera, panels: Panels, i: int, res: float, reach: Array) -> None:
-    corner, across, down = panels.corner[i], panels.across[i], panels.down[i]
-    drop = EYE - corner[2]
+def _levels_in_view(cam: Camera, panels: Panels, reach: float) -> Iterator[tuple[int, slice, slice]]:
+    """The level panels that may be seen: number, and the columns and rows of the picture that hold them."""
+    across, down, corner = panels.across[:, :2], panels.down[:, :2], panels.corner[:, :2]
+    ends = np.stack([corner, corner + across, corner + down, corner + across + down], axis=1)
+    drop = EYE - panels.corner[:, 2]
     # A top is seen from above, an underside from below.
-    up = across[0] * down[1] - across[1] * down[0] > 0
-    if up != (drop > 0):
+    faces = (across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0] > 0) == (drop > 0)
+    near, far = np.maximum(ends[..., 0].min(axis=1), np.float32(NEAR)), ends[..., 0].max(axis=1)
+    tangents = ends[..., 1] / np.maximum(ends[..., 0], np.float32(NEAR))
+    # With a corner behind the camera the tangents say nothing, and all columns are looked at.
+    behind = ends[..., 0].min(axis=1) < NEAR
+    left = np.searchsorted(cam.columns, np.where(behind, -np.inf, tangents.min(axis=1)))
+    right = np.searchsorted(cam.columns, np.where(behind, np.inf, tangents.max(axis=1)))
+    edges = np.sort(drop[:, None] / np.stack([near, np.maximum(far, np.float32(NEAR))], axis=1), axis=1)
+    top, bottom = np.searchsorted(cam.rows, edges[:, 0]), np.searchsorted(cam.rows, edges[:, 1])
+    chosen = faces & (far > NEAR) & (near < reach) & (left < right) & (top < bottom)
+    for i in np.flatnonzero(chosen).tolist():
+        yield i, slice(left[i], right[i]), slice(top[i], bottom[i])
+
+
+def _draw_level(frame: _Frame, cam: Camera, panels: Panels, i: int, res: float, part: slice, rows: slice) -> None:
+    corner, across, down = panels.corner[i, :2], panels.across[i, :2], panels.down[i, :2]
+    depth = ((EYE - panels.corner[i, 2]) / cam.rows[rows])[:, None]
+    if depth.min() >= frame.depth[rows, part].max():
         return
-    ends = np.stack([corner, corner + across, corner + down, corner + across + down])[:, :2]
-    part, rows = _extent(cam, ends, drop)
-    if part.start >= part.stop or rows.start >= rows.stop or max(float(ends[:, 0].min()), 0) > reach[part].max():
-        return
-    depth = (drop / cam.rows[rows])[:, None]
     k = cam.columns[part]
     s, t = (
-        (depth * (side[0] + side[1] * k) - corner[:2] @ side[:2]) / (side[:2] @ side[:2]) for side in (across, down)
+        (depth * ((side[0] + side[1] * k) / (side @ side)) - (corner @ side) / (side @ side)) for side in (across, down)
     )
-    slack = np.float32(2e-3)
-    seen = (np.abs(s - 0.5) <= 0.5 + slack) & (np.abs(t - 0.5) <= 0.5 + slack) & (depth < frame.depth[rows, part])
-    width, height = np.hypot(across[0], across[1]), np.hypot(down[0], down[1])
-    np.copyto(frame.u[rows, part], panels.spot[i, 0] + s * width * res - np.float32(0.5), where=seen)
-    np.copyto(frame.v[rows, part], panels.spot[i, 1] + t * height * res - np.float32(0.5), where=seen)
+    slack = np.float32(0.5 + 2e-3)
+    seen = (np.abs(s - 0.5) <= slack) & (np.abs(t - 0.5) <= slack) & (depth < frame.depth[rows, part])
+    if not seen.any():
+        return
+    width, height = np.float32(np.hypot(*across)), np.float32(np.hypot(*down))
+    np.copyto(frame.u[rows, part], s * (width * res) + (panels.spot[i, 0] - np.float32(0.5)), where=seen)
+    np.copyto(frame.v[rows, part], t * (height * res) + (panels.spot[i, 1] - np.float32(0.5)), where=seen)
     np.copyto(frame.depth[rows, part], depth, where=seen)
-
-
-def _extent(cam: Camera, ends: Array, drop: float) -> tuple[slice, slice]:
-    """Columns and rows of the picture that hold a level panel with these corners (depth, offset)."""
-    far = float(ends[:, 0].max())
-    if far < NEAR:
-        return slice(0, 0), slice(0, 0)
-    near = max(float(ends[:, 0].min()), NEAR)
-    edges = np.sort([drop / near, drop / far])
-    rows = slice(int(np.searchsorted(cam.rows, edges[0])), int(np.searchsorted(cam.rows, edges[1], side="right")))
-    if ends[:, 0].min() < NEAR:
-        return slice(0, len(cam.columns)), rows
-    k = ends[:, 1] / ends[:, 0]
-    part = slice(int(np.searchsorted(cam.columns, k.min())), int(np.searchsorted(cam.columns, k.max(), side="right")))
-    return part, rows
 
 
 def develop(coded: NDArray[np.uint8], exposure: float, noise: Array) -> NDArray[np.uint8]:
@@ -171,7 +173,7 @@ def develop(coded: NDArray[np.uint8], exposure: float, noise: Array) -> NDArray[
     curve = 255 * (1 - np.exp(-1.5 * exposure * radiance)) ** (1 / 1.8)
     picture = np.asarray(cv2.LUT(coded, curve.astype(np.float32)), np.float32)
     picture += noise[..., None]
-    return np.clip(picture + 0.5, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(picture + 0.5, 0, 255), np.uint8)
 
 
 def mean_radiance(coded: NDArray[np.uint8]) -> float:

@@ -19,7 +19,9 @@ from placerec.lab.world import Panel, outline, place
 Progress = Callable[[int, int], None]
 
 OWNED = ("seq[34]_*", "README.txt")
-SEQUENCES = tuple(f"{path}_{weather}{run}" for path in ("seq3", "seq4") for weather in ILLUMINATIONS for run in (1, 2, 3))
+SEQUENCES = tuple(
+    f"{path}_{weather}{run}" for path in ("seq3", "seq4") for weather in ILLUMINATIONS for run in (1, 2, 3)
+)
 JPEG_QUALITY = 90
 # 7 July 2006, 17:13 UTC: when COLD was recorded in Saarbruecken.
 FIRST_DAY = 1152292394.730711
@@ -38,8 +40,8 @@ class Scale:
 
 
 SCALES = {
-    "tiny": Scale(160, 120, 50, 1.5, Timing({"seq3": (38, 44), "seq4": (54, 62)}, 0.2, 0.5, 0.01)),
-    "small": Scale(160, 120, 60, 2.0, Timing({"seq3": (105, 121), "seq4": (150, 174)}, 0.15, 0.5, 0.015)),
+    "tiny": Scale(160, 120, 50, 1.5, Timing({"seq3": (38, 44), "seq4": (56, 64)}, 0.6, 0.8, 0.01, brief=True)),
+    "small": Scale(160, 120, 60, 2.0, Timing({"seq3": (105, 121), "seq4": (150, 174)}, 0.38, 0.7, 0.015)),
     "paper": Scale(320, 240, 80, 1.5, Timing({"seq3": (720, 860), "seq4": (1000, 1110)}, 0.13, 0.4, 0.02)),
 }
 
@@ -78,7 +80,7 @@ def render(
 
 @dataclass(frozen=True)
 class Run:
-    """One sequence before it is rendered: its panels, light, poses (n, 3), time stamps (n,) and what noise is drawn by."""
+    """One sequence before it is rendered: panels, light, poses (n, 3), time stamps (n,), and what draws its noise."""
 
     panels: tuple[Panel, ...]
     light: Illumination
@@ -105,7 +107,8 @@ def _record(folder: Path, run: Run, painted: Paint, scale: Scale) -> Iterator[No
     scene = light_up(run.panels, painted, run.light)
     for part in ("std_cam", "localization"):
         (folder / part).mkdir(parents=True)
-    lines, exposure = [], 0.0
+    lines: list[str] = []
+    exposure = 0.0
     for (x, y, heading), time in zip(run.poses.tolist(), run.times.tolist(), strict=True):
         coded = look(scene, cam, (x, y, heading))
         wanted = run.light.exposure * (MIDDLE_GREY / mean_radiance(coded)) ** 0.5

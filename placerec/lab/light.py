@@ -87,7 +87,7 @@ def openings(panels: Sequence[Panel]) -> dict[str, list[Opening]]:
         corner, across, down = (np.array(v, np.float32) for v in (panel.corner, panel.across, panel.down))
         length, height = panel.size
         for kind, x, z, wide, high in panel.parts:
-            if kind in WINDOW_KINDS and 0 <= x and x + wide <= length:
+            if kind in WINDOW_KINDS and x >= 0 and x + wide <= length:
                 unit = across / length
                 start = corner + unit * x + down * (1 - (z + high) / height)
                 normal = np.array([unit[1], -unit[0], 0], np.float32)
@@ -96,70 +96,92 @@ def openings(panels: Sequence[Panel]) -> dict[str, list[Opening]]:
     return found
 
 
-def irradiance(panel: Panel, room: Room, windows: list[Opening], light: Illumination) -> Array:
-    """What reaches a panel, on a coarse grid (rows, columns, 3): lamps, sky and sun of its own room."""
-    points, normal = _grid(panel)
-    direct = np.zeros(points.shape[:2], np.float32)
+def irradiance(panels: Sequence[Panel], light: Illumination) -> list[Array]:
+    """What reaches each panel, on a coarse grid (rows, columns, 3): lamps, sky and sun of its own room."""
+    windows = openings(panels)
+    result: list[Array] = [np.empty(0, np.float32)] * len(panels)
+    for r in ROOMS:
+        # A room at a time: there are hundreds of small panels, and one call for all their points is quick.
+        mine = [i for i, panel in enumerate(panels) if panel.room == r.name]
+        grids = [_grid(panels[i]) for i in mine]
+        points = np.concatenate([g.reshape(-1, 3) for g, _ in grids])
+        normals = np.concatenate([np.broadcast_to(n, (g.size // 3, 3)) for g, n in grids])
+        amount = _received(points, normals, r, windows[r.name], light)
+        cuts = np.cumsum([g.size // 3 for g, _ in grids])[:-1]
+        for i, (grid, _), part in zip(mine, grids, np.split(amount, cuts), strict=True):
+            result[i] = part.reshape(grid.shape[:2])[..., None] * np.array(light.tint, np.float32)
+    return result
+
+
+def _received(points: Array, normals: Array, room: Room, windows: list[Opening], light: Illumination) -> Array:
+    total = np.zeros(len(points), np.float32)
     lamp = light.lamps.get(room.name, 0.0)
     for x, y in room.lamps if lamp else ():
-        direct += 1.9 * lamp * _falloff(points, normal, np.array([x, y, CEILING - 0.02], np.float32), (0, 0, -1))
+        total += 1.9 * lamp * _falloff(points, normals, np.array([x, y, CEILING - 0.02]), np.array([0, 0, -1]))
     for w in windows:
-        direct += 1.5 * light.sky * w.area * _falloff(points, normal, w.middle, w.normal)
+        total += 1.5 * light.sky * w.area * _falloff(points, normals, w.middle, w.normal)
     # Light that bounces between the walls: in proportion to what comes in, over the room's surface.
     floor = (room.x1 - room.x0) * (room.y1 - room.y0)
-    bounced = (1.3 * lamp * len(room.lamps) + 1.1 * light.sky * sum(w.area for w in windows)) / (floor + 4)
+    total += (1.3 * lamp * len(room.lamps) + 1.1 * light.sky * sum(w.area for w in windows)) / (floor + 4)
     # Doors let in a little of the neighbours' light.
-    total = (direct + bounced + 0.03 + 0.04 * min(light.sky, 1.5)) * _corners(panel, points, room)
+    total += 0.03 + 0.04 * min(light.sky, 1.5)
+    total *= _corners(points, normals, room)
     if light.sunlight:
         for w in (w for w in windows if w.clear):
-            total += light.sunlight * _patch(points, normal, w, light.sun)
-    return np.asarray(total[..., None] * np.array(light.tint, np.float32), np.float32)
+            total += light.sunlight * _patch(points, normals, w, light.sun)
+    return total
 
 
 def _grid(panel: Panel) -> tuple[Array, Array]:
+    """Points on a panel (rows, columns, 3) and its unit normal."""
     corner, across, down = (np.array(v, np.float32) for v in (panel.corner, panel.across, panel.down))
-    columns, rows = (max(2, round(size / GRAIN)) for size in panel.size)
-    u, v = (np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows
-    points = corner + u[None, :, None] * across + v[:, None, None] * down
-    normal = np.cross(across, -down)
-    return points.astype(np.float32), np.asarray(normal / np.linalg.norm(normal), np.float32)
+    width, height = panel.size
+    columns, rows = max(2, round(width / GRAIN)), max(2, round(height / GRAIN))
+    u, v = (np.arange(columns, dtype=np.float32) + 0.5) / columns, (np.arange(rows, dtype=np.float32) + 0.5) / rows
+    points = np.asarray(corner + u[None, :, None] * across + v[:, None, None] * down, np.float32)
+    (a, b, c), (d, e, f) = panel.across, panel.down
+    normal = np.array([c * e - b * f, a * f - c * d, b * d - a * e], np.float32)
+    return points, np.asarray(normal / (width * height), np.float32)
 
 
-def _falloff(points: Array, normal: Array, source: Array, facing: Sequence[float] | Array) -> Array:
-    way = source - points
-    square = np.einsum("rcx,rcx->rc", way, way)
-    leaving = -way @ np.asarray(facing, np.float32)
-    arriving = way @ normal
+def _dot(a: Array, b: Array) -> Array:
+    """Scalar products along the last axis: not BLAS, whose rounding may depend on its number of threads."""
+    return np.asarray(a[:, 0] * b[..., 0] + a[:, 1] * b[..., 1] + a[:, 2] * b[..., 2], np.float32)
+
+
+def _falloff(points: Array, normals: Array, source: NDArray[np.floating], facing: NDArray[np.floating]) -> Array:
+    way = source.astype(np.float32) - points
+    square = _dot(way, way)
+    leaving = -_dot(way, facing.astype(np.float32))
+    arriving = _dot(way, normals)
     # Fabric and plaster scatter: a surface turned away from the source still gets a part.
     cosines = np.maximum(leaving, 0) * np.maximum(arriving + 0.15 * np.sqrt(square), 0)
     return np.asarray(cosines / (square * (square + 0.6)), np.float32)
 
 
-def _corners(panel: Panel, points: Array, room: Room) -> Array:
+def _corners(points: Array, normals: Array, room: Room) -> Array:
     """Corners are darker: 1 in the open, 0.7 where two surfaces meet."""
-    gaps = [points[..., 2], CEILING - points[..., 2]]
-    gaps += [np.abs(points[..., 0] - x) for x in (room.x0, room.x1)]
-    gaps += [np.abs(points[..., 1] - y) for y in (room.y0, room.y1)]
-    # The nearest gap of a wall is to itself.
-    shade = np.ones(points.shape[:2], np.float32)
-    for gap in gaps:
-        if float(gap.max()) > 0.05:
-            shade *= 1 - 0.3 * np.exp(-gap / 0.18)
+    shade = np.ones(len(points), np.float32)
+    for axis, low, high in ((0, room.x0, room.x1), (1, room.y0, room.y1), (2, 0.0, CEILING)):
+        gap = np.minimum(np.abs(points[:, axis] - low), np.abs(points[:, axis] - high))
+        # What lies in a wall or faces it is not its corner.
+        shade *= np.where(np.abs(normals[:, axis]) > 0.9, 1, 1 - 0.3 * np.exp(-gap / 0.18))
     return shade
 
 
-def _patch(points: Array, normal: Array, window: Opening, sun: tuple[float, float, float]) -> Array:
+def _patch(points: Array, normals: Array, window: Opening, sun: tuple[float, float, float]) -> Array:
+    """How much of the sun comes through the window to each point: 0 in the shadow."""
     towards = np.array(sun, np.float32)
-    lit, through = float(normal @ towards), float(window.normal @ towards)
-    if lit <= 0 or through >= 0:
-        return np.zeros(points.shape[:2], np.float32)
-    way = ((window.corner - points) @ window.normal) / through
-    hit = points + way[..., None] * towards - window.corner
+    through = float(window.normal @ towards)
+    if through >= 0:
+        return np.zeros(len(points), np.float32)
+    way = _dot(window.corner - points, window.normal) / through
+    hit = points + way[:, None] * towards - window.corner
     across, down = float(window.across @ window.across), float(window.down @ window.down)
-    u, v = hit @ window.across / across, hit @ window.down / down
+    u, v = _dot(hit, window.across) / across, _dot(hit, window.down) / down
     panes = max(1, round(across**0.5 / 0.75))
     # Distances in metres to the glass's border and to the bars; the sun is no point, so edges are a little soft.
     border = np.minimum(np.minimum(u, 1 - u) * across**0.5, np.minimum(v, 1 - v) * down**0.5)
     bars = np.minimum(np.abs(u * panes - np.round(u * panes)) * across**0.5 / panes, np.abs(v - 0.28) * down**0.5)
     glass = np.clip(np.minimum(border, bars) / 0.08 - 0.3, 0, 1)
-    return np.asarray(np.where(way > 0, glass * lit, 0), np.float32)
+    return np.asarray(np.where(way > 0, glass * np.maximum(_dot(normals, towards), 0), 0), np.float32)

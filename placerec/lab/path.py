@@ -17,7 +17,7 @@ Track = NDArray[np.float64]
 # Metres between the points of a dense track.
 STEP = 0.01
 # Metres that turning by a radian counts for: a robot slows down when it turns.
-TURN = 0.3
+TURN = 0.6
 # The robot's radius, and how much wider it keeps when it can.
 CLEARANCE = 0.16
 
@@ -27,13 +27,15 @@ class Timing:
     """How a tour is spread over frames.
 
     `frames` is the range of a sequence's length for seq3 and seq4; `still` the share of frames in which the robot
-    stands; `pace` how unevenly it drives (deviation of the speed's logarithm); `wobble` the camera's unrest, radians.
+    stands; `pace` how unevenly it drives (deviation of the speed's logarithm); `wobble` the camera's unrest, radians;
+    with `brief` the robot does not look around in the washroom, for which a short sequence has too few frames.
     """
 
     frames: dict[str, tuple[int, int]]
     still: float
     pace: float
     wobble: float
+    brief: bool = False
 
 
 # Mean frames of each visit of a tour (corridor between the rooms), after COLD's label files of Saarbruecken part B,
@@ -49,14 +51,16 @@ def _ring(x: float, y: float, radius: float, start: float, sweep: float) -> list
     return [(x + radius * float(np.cos(a)), y + radius * float(np.sin(a))) for a in angles]
 
 
-def _toilets(rng: np.random.Generator) -> list[tuple[float, float]]:
+def _toilets(rng: np.random.Generator, brief: bool) -> list[tuple[float, float]]:
     first, second = rng.uniform(0.16, 0.26, 2)
     y1, y2 = 2.0 + rng.uniform(-0.15, 0.15), 4.3 + rng.uniform(-0.3, 0.25)
-    into = [(1.7, 0.1), (1.98, 0.45), (2.05, 1.1), (2.06, 1.6)]
+    way = [(1.7, 0.1), (1.98, 0.45), (2.05, 1.1), (2.06, 1.6)]
     look = _ring(2.06 - first, y1, first, 0, float(rng.uniform(300, 420)))
-    through = [(2.07, y1 + 0.2), (2.08, 2.8), (2.08, 3.3), (2.1, y2 - 0.3)]
+    if not brief:
+        way += look
+    way += [(2.07, y1 + 0.2), (2.08, 2.8), (2.08, 3.3), (2.1, y2 - 0.3)]
     turn = _ring(2.1 - second, y2, second, 0, float(rng.uniform(190, 330)))
-    return into + look + through + turn + [(2.0, y2 - 0.5), (2.05, 3.3), (2.05, 2.8), (2.05, 1.9), (2.03, 1.1), (2.0, 0.5)]
+    return way + turn + [(2.0, y2 - 0.5), (2.05, 3.3), (2.05, 2.8), (2.05, 1.9), (2.03, 1.1), (2.0, 0.5)]
 
 
 def _kitchen(rng: np.random.Generator) -> list[tuple[float, float]]:
@@ -73,9 +77,8 @@ def _kitchen(rng: np.random.Generator) -> list[tuple[float, float]]:
 def _office(rng: np.random.Generator) -> list[tuple[float, float]]:
     radius, y = rng.uniform(0.16, 0.28), -4.15 + rng.uniform(-0.35, 0.35)
     turn = _ring(0.55 - radius, y, radius, 0, -float(rng.uniform(170, 300)))
-    return [(0.9, -0.6), (0.8, -1.1), (0.78, -1.7), (0.65, -2.6), (0.55, y + 0.5), *turn] + [
-        (0.45, y + 0.7), (0.65, -2.5), (0.77, -1.7), (0.77, -1.1), (0.7, -0.55),
-    ]  # fmt: skip
+    into = [(0.9, -0.6), (0.8, -1.1), (0.78, -1.7), (0.65, -2.6), (0.55, y + 0.5)]
+    return into + turn + [(0.45, y + 0.7), (0.65, -2.5), (0.77, -1.7), (0.77, -1.1), (0.7, -0.55)]
 
 
 def _printer(rng: np.random.Generator) -> list[tuple[float, float]]:
@@ -86,10 +89,10 @@ def _printer(rng: np.random.Generator) -> list[tuple[float, float]]:
     return way + turn + [(-6.05, 1.2), (-5.9, 0.6), (-5.3, 0.15)]
 
 
-def tour(path: str, rng: np.random.Generator) -> Track:
+def tour(path: str, rng: np.random.Generator, brief: bool = False) -> Track:
     """Control points (n, 2) of a tour of `path` (seq3 or seq4) with this run's liberties."""
     lane = float(rng.uniform(0.0, 0.35))
-    points = [(0.1, 0.0), (0.5, 0.0), (1.1, 0.0), *_toilets(rng)]
+    points = [(0.1, 0.0), (0.5, 0.0), (1.1, 0.0), *_toilets(rng, brief)]
     points += _kitchen(rng) if path == "seq4" else [(1.9, -0.2), (1.5, -0.4)]
     points += [*_office(rng), *_printer(rng), (-4.0, lane), (-2.0, lane), (-0.6, lane), (0.3, lane)]
     return np.array(points)
@@ -114,7 +117,7 @@ def smooth(points: Track) -> Track:
 def clear(track: Track, outline: NDArray[np.float64], gap: float = CLEARANCE) -> bool:
     """Whether the whole track (n, 2+) keeps `gap` metres from all segments of `outline` (m, 4)."""
     start, edge = outline[:, :2], outline[:, 2:] - outline[:, :2]
-    way = track[::4, None, :2] - start
+    way = track[::6, None, :2] - start
     along = np.clip((way * edge).sum(-1) / np.maximum((edge * edge).sum(-1), 1e-12), 0, 1)
     return bool((np.hypot(*np.moveaxis(way - along[..., None] * edge, -1, 0)) >= gap).all())
 
@@ -125,7 +128,7 @@ def drive(path: str, outline: NDArray[np.float64], timing: Timing, rng: np.rando
     Raises RuntimeError if no free tour is found: the floor plan is then wrong.
     """
     for _ in range(40):
-        points = tour(path, rng)
+        points = tour(path, rng, timing.brief)
         track = smooth(points + rng.normal(0, 0.035, points.shape))
         if clear(track, outline):
             break
@@ -134,7 +137,7 @@ def drive(path: str, outline: NDArray[np.float64], timing: Timing, rng: np.rando
     poses = track[_schedule(path, track, timing, rng)]
     # Driving shakes the camera a little; standing, it is quiet.
     moving = np.concatenate([[0.0], np.hypot(*np.diff(poses[:, :2], axis=0).T) > 1e-9])
-    poses[:, 2] += np.cumsum(rng.normal(0, 1, len(poses)) * moving * 0.0) + rng.normal(0, timing.wobble, len(poses)) * moving
+    poses[:, 2] += rng.normal(0, timing.wobble, len(poses)) * moving
     return poses
 
 
@@ -164,17 +167,19 @@ def _lengths(
     # No faster than twice the tour's mean speed, or a short visit would be a jump.
     drawn = np.maximum(drawn, 0.5 * efforts / efforts.sum() * means.sum())
     low, high = timing.frames[path]
-    return np.maximum(2, np.round(drawn / drawn.sum() * rng.integers(low, high + 1))).astype(np.int64)
+    total = int(rng.integers(low, high + 1))
+    return np.asarray(np.maximum(2, np.round(drawn / drawn.sum() * total)), np.int64)
 
 
 def _paces(count: int, timing: Timing, rng: np.random.Generator) -> NDArray[np.float64]:
     """Relative way of each frame of a visit: a slowly changing speed, with stops of a few frames."""
     speed = np.exp(timing.pace * np.convolve(rng.normal(0, 1, count + 4), np.ones(5) / 5**0.5, mode="valid"))
     speed = np.minimum(speed, 3 * np.median(speed))
-    stop = 0
+    # Stops last four frames on average; started this often, they fill the share that is asked for.
+    chance, stop = timing.still / (4 * (1 - timing.still)), 0
     for i in range(1, count):
-        if stop == 0 and rng.random() < timing.still / 4:
+        if stop == 0 and rng.random() < chance:
             stop = int(rng.integers(2, 7))
         if stop:
             speed[i], stop = 0.0, stop - 1
-    return speed
+    return np.asarray(speed, np.float64)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from placerec.lab.fittings import skin
 from placerec.lab.furniture import furniture
-from placerec.lab.light import Illumination, irradiance, openings
+from placerec.lab.light import Illumination, irradiance
 from placerec.lab.textures import Skin, paste
-from placerec.lab.world import CEILING, ROOMS, Panel, room, walls
+from placerec.lab.world import CEILING, ROOMS, Panel, walls
 
 Array = NDArray[np.float32]
 
@@ -80,10 +80,10 @@ def light_up(panels: Sequence[Panel], painted: Paint, light: Illumination) -> Sc
     """Light the painted panels of one run."""
     widest = max(s.day.shape[1] for s in painted.skins) + 2 * BORDER
     atlas = np.zeros((painted.rows, max(ATLAS_WIDTH, widest), 3), np.uint8)
-    windows = openings(panels)
-    for panel, look, (x, y) in zip(panels, painted.skins, painted.spots, strict=True):
+    received = irradiance(panels, light)
+    for panel, look, (x, y), amount in zip(panels, painted.skins, painted.spots, received, strict=True):
         rows, columns = look.day.shape
-        lit = cv2.resize(irradiance(panel, room(panel.room), windows[panel.room], light), (columns, rows))
+        lit = np.asarray(cv2.resize(amount, (columns, rows)), np.float32)
         lit *= look.albedo
         lit += (light.sky * look.day + 2.5 * look.lamp * min(1.0, light.lamps.get(panel.room, 0.1)))[..., None]
         coded = np.sqrt(np.minimum(lit * np.float32(255.0**2 / BRIGHTEST), np.float32(255.0**2))).astype(np.uint8)
@@ -97,7 +97,8 @@ def light_up(panels: Sequence[Panel], painted: Paint, light: Illumination) -> Sc
 
 def _arrays(panels: Sequence[Panel], painted: Paint, chosen: NDArray[np.bool_]) -> Panels:
     pairs = [(p, s) for p, s, c in zip(panels, painted.spots, chosen, strict=True) if c]
-    corner, across, down = (np.array([getattr(p, k) for p, _ in pairs], np.float32) for k in ("corner", "across", "down"))
+    edges = [(p.corner, p.across, p.down) for p, _ in pairs]
+    corner, across, down = np.moveaxis(np.array(edges, np.float32), 1, 0)
     return Panels(corner, across, down, np.array([s for _, s in pairs], np.float32))
 
 

@@ -4,6 +4,7 @@ Metres; x to the east along the corridor, y to the north, z up; the layout follo
 of Saarbruecken: a corridor, the toilet and the kitchen north of it, the office south, the printer area at its end.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 
 CEILING = 2.6
 LINTEL = 2.1
-GAP = 0.2
 
 Point = tuple[float, float, float]
 
@@ -72,11 +72,12 @@ class Panel:
 
     @property
     def size(self) -> tuple[float, float]:
-        return float(np.linalg.norm(self.across)), float(np.linalg.norm(self.down))
+        """Width and height in metres."""
+        return math.hypot(*self.across), math.hypot(*self.down)
 
 
 ROOMS = (
-    Room("corridor", -7.0, -1.0, 7.4, 1.0, "plaster", "lino", ((-6, 0), (-3.5, 0), (-1, 0), (1.5, 0), (4, 0), (6.4, 0))),
+    Room("corridor", -7.0, -1.0, 7.4, 1.0, "plaster", "lino", tuple((x, 0.0) for x in (-6, -3.5, -1, 1.5, 4, 6.4))),
     Room("printer", -7.0, 1.2, -4.5, 3.7, "plaster", "lino", ((-5.8, 2.5),)),
     Room("washroom", 0.6, 1.2, 3.2, 3.1, "tiled", "floor tiles", ((1.9, 2.1),)),
     Room("toilet", 0.6, 3.3, 3.2, 6.5, "tiled", "floor tiles", ((1.9, 4.3),)),
@@ -102,11 +103,6 @@ def place(x: float, y: float) -> str:
     if y < 0:
         return "1PO-B"
     return "PA-B" if x < -4.0 else "TL-B" if x < 3.4 else "KT-B"
-
-
-def room(name: str) -> Room:
-    """The room of that name."""
-    return next(r for r in ROOMS if r.name == name)
 
 
 def fixtures(rng: np.random.Generator) -> tuple[Fixture, ...]:
@@ -148,7 +144,11 @@ def fixtures(rng: np.random.Generator) -> tuple[Fixture, ...]:
         ("office", "east", "board", 1.4, 1.2, 1.2, 0.9),
         ("office", "north", "poster", 0.2, 1.1, 0.6, 0.85),
     )
-    switches = (("corridor", "north", 8.3), ("printer", "south", 0.2), ("washroom", "south", 0.3), ("office", "north", 2.4))
+    switches = (
+        ("corridor", "north", 8.3),
+        ("washroom", "south", 0.3),
+        ("office", "north", 2.4),
+    )
     loose = tuple(Fixture(*h[:3], h[3] + float(rng.uniform(-0.12, 0.12)), *h[4:]) for h in hung)
     return fixed + loose + tuple(Fixture(r, s, "switch", at, 1.1, 0.09, 0.09) for r, s, at in switches)
 

@@ -165,7 +165,9 @@ class _Reader:
                 raise self.error(f"backoff weight {parts[-1]} is not finite", line)
             if top and weight != 0:
                 raise self.error(f"backoff weight {parts[-1]} on the highest order, which has none", line)
-        return _zero(log10_p), parts[1 : n + 1], np.nan if top else _zero(weight)
+        # KenLM takes both spellings for the unknown word.
+        words = ["<unk>" if word == "<UNK>" else word for word in parts[1 : n + 1]]
+        return _zero(log10_p), words, np.nan if top else _zero(weight)
 
     def number(self, text: str, line: int, what: str) -> float:
         try:

@@ -52,7 +52,7 @@ class ModelCheck:
 
 
 def context_sums(model: BackoffModel) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.float64]]]:
-    """Per order n: n, the rows (m,) of order n-1 that are contexts, and the sum (m,) over all words w of p(w | context).
+    """Per order: n, the rows (m,) of order n-1 that are contexts, and the sum (m,) over all words of p(word | context).
 
     <s> is not predicted and left out; the empty context comes first, as row 0 of order 0.
     """

@@ -39,8 +39,10 @@ class Descriptors:
 
     def rows_by_sequence(self) -> dict[str, NDArray[np.int64]]:
         """Sequence name -> the indices of its frames, both in order; a sequence without readable images is absent."""
-        names = np.array(self.sequences)
-        return {name: np.flatnonzero(names == name) for name in dict.fromkeys(self.sequences)}
+        rows: dict[str, list[int]] = {}
+        for row, name in enumerate(self.sequences):
+            rows.setdefault(name, []).append(row)
+        return {name: np.array(its, np.int64) for name, its in rows.items()}
 
 
 def describe(

@@ -198,7 +198,9 @@ def _restored(arrays: Arrays, meta: dict[str, Any]) -> Dictionary:
         quality = Quality(**meta["quality"])
     except (KeyError, TypeError) as error:
         raise VisionError(f"its meta is incomplete ({error})") from error
-    _check_arrays(arrays, {"d": spec.length, "k": len(arrays["components"]), "K": training.size**2})
+    if not all(isinstance(value, int | float) for value in asdict(quality).values()):
+        raise VisionError("its meta holds a quality that is not a number")
+    _check_arrays(arrays, {"d": spec.length, "k": arrays["variances"].size, "K": training.size**2})
     pca = Pca(arrays["mean"], arrays["components"], arrays["variances"], quality.explained, quality.needed)
     return Dictionary(spec, pca, arrays["codebook"], arrays["hits"], training, quality)
 

@@ -62,7 +62,7 @@ def test_standard_input_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(RIGHT.encode())))
     assert list(evaluate_files(["-"]).sequences) == ["stdin"]
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(b"\xff")))
-    with pytest.raises(EvaluationError, match="^<stdin>: byte 0xff is not UTF-8$"):
+    with pytest.raises(EvaluationError, match=r"^<stdin>: byte 0xff is not UTF-8$"):
         evaluate_files(["-"])
 
 

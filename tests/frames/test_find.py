@@ -188,15 +188,13 @@ def test_names_that_stay_equal(tmp_path: Path) -> None:
     for part in ("a", "b"):
         make(tmp_path / part / "lab/seq1/std_cam", "t1.000000.jpeg")
     one, two = tmp_path / "a/lab/seq1", tmp_path / "b/lab/seq1"
-    assert failure(tmp_path) == f"{two}: is named lab-seq1, as {one} is; rename one of the folders"
+    assert failure(tmp_path) == f"{two}: is named lab-seq1, as {one} is; rename one of them"
 
 
 def test_a_name_made_longer_may_meet_another(tmp_path: Path) -> None:
     for name in ("a/s", "b/s", "c/a-s"):
         make(tmp_path / name / "std_cam", "t1.000000.jpeg")
-    assert (
-        failure(tmp_path) == f"{tmp_path / 'c/a-s'}: is named a-s, as {tmp_path / 'a/s'} is; rename one of the folders"
-    )
+    assert failure(tmp_path) == f"{tmp_path / 'c/a-s'}: is named a-s, as {tmp_path / 'a/s'} is; rename one of them"
 
 
 def test_the_same_sequence_twice(tmp_path: Path) -> None:

@@ -74,7 +74,9 @@ def _case(folder: Path, case: dict[str, Any], options: dict[str, str]) -> Case:
         name=case["id"],
         sentences=_lines(inputs[options["-text"]]),
         vocabulary=None if vocabulary is None else [line[0] for line in vocabulary if line],
-        non_events=[line[0] for line in _lines(inputs[options["-nonevents"]]) if line] if "-nonevents" in options else [],
+        non_events=[line[0] for line in _lines(inputs[options["-nonevents"]]) if line]
+        if "-nonevents" in options
+        else [],
         order=int(options.get("-order", 3)),
         smoothing=rule,
         min_count=[max(1, int(options.get(f"-gt{n}min", 1 if n < 3 else 2))) for n in range(1, 10)],

@@ -90,7 +90,9 @@ def test_errors_name_line_and_value(old: str, new: str, message: str, tmp_path: 
 
 def test_a_missing_context_is_named(tmp_path: Path) -> None:
     path = tmp_path / "bad.arpa"
-    text = GOOD.replace("ngram 2=1\n", "ngram 2=1\nngram 3=1\n").replace("\\end\\", "\\3-grams:\n-0.1\tb a b\n\n\\end\\")
+    text = GOOD.replace("ngram 2=1\n", "ngram 2=1\nngram 3=1\n").replace(
+        "\\end\\", "\\3-grams:\n-0.1\tb a b\n\n\\end\\"
+    )
     path.write_text(text)
     with pytest.raises(LanguageModelError, match=r":15: the context 'b a' is not among the 2-grams$"):
         read_arpa(path)

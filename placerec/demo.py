@@ -1,0 +1,218 @@
+"""The demonstration: the synthetic laboratory from images to a page to look at."""
+
+import logging
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from placerec.evaluation import (
+    Evaluation,
+    evaluate,
+    heading,
+    html_page,
+    paragraph,
+    picture,
+    plot_evaluation,
+    preformatted,
+    table,
+)
+from placerec.evaluation.sheet import contact_sheet
+from placerec.files import whole_folder, write_text
+from placerec.frames import Sequence as FrameSequence
+from placerec.frames import find_sequences
+from placerec.hohmm import Beliefs, write_beliefs
+from placerec.lab import render_lab
+from placerec.lm.inspection import format_inspection, inspect_model
+from placerec.model import Options, load_recognizer, read_corpus, train_model
+from placerec.vision import Dictionary, describe
+from placerec.words import read_stream
+from placerec.words.tokenize import tokens_of, write_tokens
+
+ProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
+SMOOTHINGS = ("witten-bell", "lidstone")
+ORDERS = (1, 2)
+# The paper's protocol: the first two runs of each condition train, the third tests.
+TEST_RUN = "3"
+OWNED = ("lab", "words.npz", "tokens", "models", "beliefs", "*.png", "report.html")
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """One way of making models, and how the test sequences were recognised with it."""
+
+    smoothing: str
+    order: int
+    evaluation: Evaluation
+
+
+def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: ProgressBar) -> list[DemoResult]:
+    """`placerec demo`: render the laboratory, learn words and models, recognise the test runs, write the folder `out`.
+
+    `progress(label)` is a context manager that gives a callback(done, total). Returns a result per smoothing and order.
+    """
+    with whole_folder(Path(out), OWNED) as folder:
+        log.info("Rendering the synthetic laboratory (%s, seed %d)", scale, seed)
+        with progress("render") as show:
+            render_lab(folder / "lab", scale=scale, seed=seed, progress=show)
+        sequences = find_sequences([folder / "lab"])
+        log.info("Learning 100 visual words from runs 1 and 2, and translating all runs")
+        with progress("describe") as show:
+            descriptors = describe(sequences, progress=show)
+        training = np.array([not name.endswith(TEST_RUN) for name in descriptors.sequences])
+        dictionary = Dictionary.fit(descriptors.values[training], spec=descriptors.spec, seed=seed)
+        dictionary.save(folder / "words.npz")
+        write_tokens(tokens_of(descriptors, dictionary), dictionary, folder / "tokens")
+        log.info("Training language models and recognising run 3")
+        results: list[DemoResult] = []
+        best: list[Beliefs] = []
+        for smoothing in SMOOTHINGS:
+            for order in ORDERS:
+                beliefs = _recognise(folder, smoothing, order)
+                results.append(DemoResult(smoothing, order, evaluate(beliefs)))
+                best = beliefs if (smoothing, order) == ("witten-bell", 2) else best
+        contact_sheet(_typical_frames(sequences), folder / "laboratory.png")
+        plot_evaluation(best, evaluate(best), folder / "beliefs.png")
+        write_text(folder / "report.html", _report(folder, results, len(descriptors.frames), _commands(scale, seed)))
+    return results
+
+
+def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
+    """Train on runs 1 and 2, and decode run 3, of the tokens in `folder`."""
+    files = sorted((folder / "tokens").glob("*.tsv"))
+    options = Options(order=order, smoothing=smoothing)
+    corpus = read_corpus([path for path in files if not path.stem.endswith(TEST_RUN)], selection=options.select)
+    model = folder / "models" / f"{smoothing}-{order}"
+    train_model(
+        corpus.sentences,
+        corpus.vocabulary,
+        model,
+        options=options,
+        sequences=corpus.sequences,
+        dictionary=corpus.dictionary,
+    )
+    recognizer = load_recognizer(model)
+    beliefs = [recognizer.decode(read_stream(path)) for path in files if path.stem.endswith(TEST_RUN)]
+    for found in beliefs:
+        write_beliefs(folder / "beliefs" / f"{smoothing}-{order}" / f"{found.name}.tsv", found)
+    return beliefs
+
+
+def format_results(results: Sequence[DemoResult]) -> str:
+    """The results as a table for the terminal."""
+    majority = results[0].evaluation
+    lines = [
+        f"Synthetic laboratory, {majority.frames} test frames of {len(majority.sequences)} sequences: frames right",
+        f"  {majority.majority_accuracy:6.1%}  always {majority.majority_place} (the majority class)",
+    ]
+    lines += [f"  {r.evaluation.accuracy:6.1%}  {r.smoothing}, n = {r.order}{_note(r.order)}" for r in results]
+    return "\n".join(lines)
+
+
+def _note(order: int) -> str:
+    return " (the classical HMM)" if order == 1 else ""
+
+
+def _typical_frames(sequences: Sequence[FrameSequence]) -> dict[str, dict[str, Path]]:
+    """Illumination -> place -> an image from when the place is entered, from first runs."""
+    sheet: dict[str, dict[str, Path]] = {}
+    for sequence in sequences:
+        if sequence.name.startswith("seq4") and sequence.name.endswith("1"):
+            light = sequence.name.removeprefix("seq4_").removesuffix("1")
+            for place in sorted({frame.place for frame in sequence.frames}):
+                frames = [frame for frame in sequence.frames if frame.place == place]
+                sheet.setdefault(light, {})[place] = frames[len(frames) // 10].path
+    return sheet
+
+
+def _report(folder: Path, results: Sequence[DemoResult], frames: int, commands: str) -> str:
+    body = [
+        paragraph(
+            f"A camera was driven through a small office laboratory: {frames} frames in 18 sequences. The laboratory "
+            "is synthetic, rendered by placerec itself; its results say that the program works, not how well it does "
+            "in your rooms. Every frame became one visual word, every place an n-gram language model of its words, "
+            "and a Bayesian filter followed the belief over places through the six sequences that trained nothing."
+        ),
+        heading("The synthetic laboratory"),
+        picture(
+            folder / "laboratory.png",
+            "Frames of five places in three illuminations",
+            "What the camera sees, by place and light. Synthetic.",
+        ),
+        heading("Frames recognised"),
+        _results_table(results),
+        heading("Belief over time"),
+        picture(
+            folder / "beliefs.png",
+            "Belief over places for each test sequence, and the confusion matrix",
+            "Witten-Bell, n = 2, on the six synthetic test sequences.",
+        ),
+        heading("Everything between is text"),
+        *_texts(folder, "KT-B"),
+        heading("Do it again"),
+        preformatted(commands),
+    ]
+    return html_page("placerec: which place is the camera in?", body)
+
+
+def _results_table(results: Sequence[DemoResult]) -> str:
+    majority = results[0].evaluation
+    rows: list[Sequence[object]] = [
+        (f"always {majority.majority_place} (majority class)", "", f"{majority.majority_accuracy:.1%}", "", "")
+    ]
+    for result in results:
+        found = result.evaluation
+        latency = "" if found.change_latency_frames is None else f"{found.change_latency_frames:g}"
+        name = f"{result.smoothing}{_note(result.order)}"
+        rows.append((name, result.order, f"{found.accuracy:.1%}", f"{found.balanced_accuracy:.1%}", latency))
+    return table(
+        ("Models", "n", "Frames right", "Mean recall of places", "Frames until right after a change (median)"),
+        rows,
+        f"{majority.frames} synthetic test frames, the third run of each path and light; runs 1 and 2 trained.",
+    )
+
+
+def _texts(folder: Path, place: str) -> list[str]:
+    model = folder / "models/witten-bell-2"
+    return [
+        paragraph("A token stream, one word per frame (tokens/seq4_cloudy3.tsv):"),
+        preformatted(_head(folder / "tokens/seq4_cloudy3.tsv", 8)),
+        paragraph(f"The visits to the kitchen, one a line (models/witten-bell-2/sentences/{place}.txt):"),
+        preformatted(_head(model / f"sentences/{place}.txt", 3)),
+        paragraph(f"Its language model, models/witten-bell-2/{place}.arpa, as `placerec inspect` reads it:"),
+        preformatted(_inspected(model, place)),
+    ]
+
+
+def _head(path: Path, lines: int) -> str:
+    text = path.read_text(encoding="utf-8").splitlines()[:lines]
+    return "\n".join(line if len(line) <= 110 else line[:107] + "..." for line in text)
+
+
+def _inspected(model: Path, place: str) -> str:
+    first = (model / f"sentences/{place}.txt").read_text(encoding="utf-8").split()
+    found = inspect_model(model / f"{place}.arpa", [" ".join(first[:2]), f"{first[0]} {_unseen(first)}"], top=3)
+    return format_inspection(found | {"path": f"{place}.arpa"})
+
+
+def _unseen(words: Sequence[str]) -> str:
+    """A word that never followed the first one."""
+    after = {b for a, b in pairwise(words) if a == words[0]}
+    return next((word for word in words if word not in after), words[0])
+
+
+def _commands(scale: str, seed: int) -> str:
+    return "\n".join(
+        [
+            f"placerec lab lab/ --scale {scale} --seed {seed}",
+            f"placerec train-words lab/seq*[12] -o words.npz --seed {seed}",
+            "placerec tokenize lab/ -w words.npz -o tokens/",
+            "placerec train-lm tokens/*[12].tsv -o model/ --order 2",
+            "placerec decode tokens/*3.tsv -m model/ -o beliefs/",
+            "placerec evaluate beliefs/*.tsv --plot beliefs.png",
+        ]
+    )

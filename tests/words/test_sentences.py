@@ -1,0 +1,87 @@
+"""Sentences: one per visit, cut where the place, the labels or time break off."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from placerec.words import (
+    Selection,
+    WordStream,
+    format_sentences,
+    parse_selection,
+    read_sentences,
+    sentences_per_place,
+    time_gaps,
+    visits,
+)
+
+
+def stream(words: str, places: str, times: list[float] | None = None) -> WordStream:
+    """A stream of one-letter words and places; `-` is unlabelled."""
+    made = WordStream.of("run", words.split(), ["" if p == "-" else p for p in places.split()])
+    if times is None:
+        return made
+    return WordStream("run", made.frames, np.array(times), made.places, made.words, made.distances)
+
+
+def test_a_visit_ends_where_the_place_changes_or_the_label_stops() -> None:
+    seen = stream("a b c d e f g", "K K L - L L K")
+    assert visits(seen, Selection()) == [("K", ["a", "b"]), ("L", ["c"]), ("L", ["e", "f"]), ("K", ["g"])]
+    assert sentences_per_place([seen], Selection()) == {"K": [["a", "b"], ["g"]], "L": [["c"], ["e", "f"]]}
+
+
+def test_a_gap_in_time_ends_a_visit() -> None:
+    times = [0, 0.2, 0.4, 60, 60.2, 61.2]
+    # The median step is 0.2 s: 59.6 s is a gap, 1 s is not (yet: ten times the median is 2 s).
+    assert visits(stream("a b c d e f", "K K K K K K", times), Selection()) == [
+        ("K", ["a", "b", "c"]),
+        ("K", ["d", "e", "f"]),
+    ]
+
+
+def test_selection_runs_over_the_sequence_before_it_is_cut() -> None:
+    seen = stream("a a a b b", "K K L L L")
+    # The third a is a repetition, whatever place it is in.
+    assert sentences_per_place([seen], parse_selection("unique")) == {"K": [["a"]], "L": [["b"]]}
+
+
+def test_a_place_without_selected_words_is_still_there() -> None:
+    assert sentences_per_place([stream("a a a b", "K L M M")], parse_selection("unique")) == {
+        "K": [["a"]],
+        "L": [],
+        "M": [["b"]],
+    }
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.sampled_from(["", "K", "L"])), max_size=30))
+def test_no_selection_keeps_every_labelled_word_in_order(frames: list[tuple[str, str]]) -> None:
+    seen = WordStream.of("run", [word for word, _ in frames], [place for _, place in frames])
+    joined = [(place, word) for place, words in visits(seen, Selection()) for word in words]
+    assert joined == [(place, word) for word, place in frames if place]
+
+
+def test_unknown_times_are_no_gaps() -> None:
+    assert not time_gaps(np.full(5, np.nan)).any()
+    assert time_gaps(np.array([0.0, 1, np.nan, 100, 101, 200])).tolist() == [False] * 5 + [True]
+
+
+def test_text_round_trip(tmp_path: Path) -> None:
+    path = tmp_path / "K.txt"
+    sentences = [["a", "b"], ["c"]]
+    path.write_text("## a comment, as in SRILM\n\n" + format_sentences(sentences))
+    assert read_sentences(path) == sentences
+
+
+def test_real_labels_give_the_visits_of_the_recording(shared: Path) -> None:
+    from placerec.frames.places import read_places
+
+    listed = read_places(shared / "cold_labels/COLD/saarbruecken/seq4_cloudy1/localization/places.lst")
+    places = [listed.places[name] for name in sorted(listed.places)]
+    found = [place for place, _ in visits(WordStream.of("seq4", ["w0"] * len(places), places), Selection())]
+    assert found[0] == "CR-B"
+    assert set(found) == {"CR-B", "PA-B", "TL-B", "1PO-B", "KT-B"}
+    assert all(a != b for a, b in zip(found, found[1:], strict=False))
+    assert pytest.approx(len(places)) == 1371

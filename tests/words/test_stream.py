@@ -1,0 +1,104 @@
+"""Token streams and vocabularies: round trips, and errors that name the line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from placerec.errors import StreamError
+from placerec.words import WordStream, read_stream, read_vocabulary, write_stream, write_vocabulary
+
+names = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=5).filter(
+    lambda name: (
+        not name.startswith(("##", "."))
+        and not set(name) & set("/\\")
+        and name not in ("frame", "time", "place", "word", "distance", "selected", "best", "unknown", "-pau-")
+    )
+)
+seconds = st.one_of(st.just(float("nan")), st.integers(0, 10**15).map(lambda microseconds: microseconds / 1e6))
+lines_of_a_stream = st.lists(
+    st.tuples(names, seconds, st.one_of(st.just(""), names), names, st.floats(0, 1e6)), max_size=8
+)
+
+
+@given(lines_of_a_stream)
+def test_what_is_written_is_read_back(
+    tmp_path_factory: pytest.TempPathFactory, lines: list[tuple[str, float, str, str, float]]
+) -> None:
+    frames, times, places, words, distances = zip(*lines, strict=True) if lines else ((), (), (), (), ())
+    stream = WordStream("run", frames, np.array(times, float), places, words, np.array(distances, float))
+    path = tmp_path_factory.getbasetemp() / "run.tsv"
+    write_stream(stream, path)
+    back = read_stream(path)
+    assert (back.name, back.frames, back.places, back.words) == ("run", frames, places, words)
+    assert np.allclose(back.times, stream.times, rtol=0, atol=1e-6, equal_nan=True)
+    assert np.allclose(back.distances, stream.distances, rtol=1e-5)
+
+
+def test_file_is_as_the_contract_says(tmp_path: Path) -> None:
+    stream = WordStream(
+        "run",
+        ("t1.5.jpeg", "t2.jpeg"),
+        np.array([1.5, np.nan]),
+        ("kitchen", ""),
+        ("w07", "w11"),
+        np.array([0.25, np.nan]),
+    )
+    write_stream(stream, tmp_path / "run.tsv")
+    assert (tmp_path / "run.tsv").read_bytes() == (
+        b"frame\ttime\tplace\tword\tdistance\nt1.5.jpeg\t1.5\tkitchen\tw07\t0.25\nt2.jpeg\t\t\tw11\t\n"
+    )
+
+
+def test_readers_need_only_the_word_column(tmp_path: Path) -> None:
+    path = tmp_path / "run.tsv"
+    path.write_bytes(b"\xef\xbb\xbfscore\tword\r\n0.5\tw1\r\n0.6\tw2\r\n")
+    stream = read_stream(path)
+    assert stream.words == ("w1", "w2")
+    assert stream.places == ("", "")
+    assert np.isnan(stream.times).all()
+
+
+def test_plain_text_is_a_stream_of_words(tmp_path: Path) -> None:
+    path = tmp_path / "run.txt"
+    path.write_text("w1 w2\nw1\n")
+    assert read_stream(path).words == ("w1", "w2", "w1")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("frame\ttime\n0\t1\n", ":1: the header 'frame\\ttime' has no column 'word'"),
+        ("frame\tword\n0\tw1\textra\n", ":2: 3 fields found, 2 expected as in the header"),
+        ("time\tword\nnoon\tw1\n", ":2: time 'noon' is not a number"),
+        ("time\tword\n1\tw1\n\n2\tw 2\n", ":4: the word 'w 2' is empty or holds white space"),
+        ("place\tword\na/b\tw1\n", ":2: place 'a/b' holds a /; rename it"),
+        ("place\tword\nbest\tw1\n", ":2: place 'best' is the name of a column in placerec's files; rename it"),
+        ("place\tword\nhall\t<s>\n", ":2: the word '<s>' has a meaning of its own in language models; rename it"),
+    ],
+)
+def test_errors_name_line_and_value(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.tsv"
+    path.write_text(text)
+    with pytest.raises(StreamError) as error:
+        read_stream(path)
+    assert str(error.value) == f"{path}{message}"
+
+
+def test_vocabulary_round_trip_and_errors(tmp_path: Path) -> None:
+    path = tmp_path / "vocab.txt"
+    write_vocabulary(["w1", "w0"], path)
+    assert path.read_bytes() == b"w1\nw0\n"
+    assert read_vocabulary(path) == ("w1", "w0")
+    for text, message in [
+        ("", ": holds no word; one word a line is expected"),
+        ("a\nb\na\n", ":3: the word 'a' is listed already, on line 1"),
+        ("a b\n", ":1: the word 'a b' is empty or holds white space"),
+        ("</s>\n", ":1: the word '</s>' has a meaning of its own in language models; rename it"),
+    ]:
+        path.write_text(text)
+        with pytest.raises(StreamError) as error:
+            read_vocabulary(path)
+        assert str(error.value) == f"{path}{message}"
