@@ -1,38 +1,47 @@
 """Output files and folders that are written whole or not at all, and text that may be gzipped."""
 
+import errno
 import gzip
 import os
 import shutil
+import sys
 import tempfile
+import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from fnmatch import fnmatch
 from pathlib import Path
 
 from placerec.errors import OutputError, PlacerecError
+
+if sys.platform != "win32":
+    import fcntl
+
+PARTIAL = ".{}.partial-"
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on success it is renamed to `path`, on failure it is removed.
 
-    Raises OutputError if `path` cannot be written.
+    A link is written through. Raises OutputError if `path` cannot be written, or is a folder or a device.
     """
     path = Path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with _writing(path):
+        target = path.resolve()
+        if target.exists() and not target.is_file():
+            kind = "a folder" if target.is_dir() else "no regular file"
+            raise OutputError(f"{path}: is {kind}, and a file is to be written; name another")
+        target.parent.mkdir(parents=True, exist_ok=True)
         # The suffix is kept: numpy and OpenCV choose their format by it.
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.partial-", suffix=path.suffix, dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=PARTIAL.format(target.name), suffix=target.suffix, dir=target.parent)
         os.close(handle)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
     partial = Path(name)
     try:
-        yield partial
-        partial.chmod(0o666 & ~_umask())
-        partial.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        with _writing(path):
+            yield partial
+            partial.chmod(0o666 & ~_umask())
+            partial.replace(target)
     finally:
         partial.unlink(missing_ok=True)
 
@@ -42,34 +51,36 @@ def whole_folder(path: Path, owned: tuple[str, ...]) -> Iterator[Path]:
     """Yield a temporary folder beside `path`; on success it takes the place of `path`, whose old content goes.
 
     Only a folder whose every entry matches one of the glob patterns `owned` is replaced: anything else there was
-    not written by placerec, and OutputError names it.
+    not written by placerec, and OutputError names it. A link is written through. What a killed run left behind is
+    removed; a run that goes on at the same time is not disturbed, and the last one to end is the one that stays.
     """
     path = Path(path)
-    foreign = sorted(
-        entry.name for entry in _entries(path) if not any(fnmatch(entry.name, pattern) for pattern in owned)
-    )
-    if foreign:
-        raise OutputError(f"{path}: holds {foreign[0]}, which this command does not write; name another folder")
-    partial = path.parent / f".{path.name}.partial"
+    with _writing(path):
+        target = path.resolve()
+        _check_replaceable(path, target, owned)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _remove_abandoned(target)
+        partial = Path(tempfile.mkdtemp(prefix=PARTIAL.format(target.name), dir=target.parent))
+        lock = _lock(partial)
     try:
-        shutil.rmtree(partial, ignore_errors=True)
-        partial.mkdir(parents=True)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
-    try:
-        yield partial
-        shutil.rmtree(path, ignore_errors=True)
-        partial.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        with _writing(path):
+            yield partial
+            partial.chmod(0o777 & ~_umask())
+            _check_replaceable(path, target, owned)
+            _exchange(partial, target)
     finally:
+        _unlock(lock)
         shutil.rmtree(partial, ignore_errors=True)
 
 
 def write_text(path: Path, text: str) -> None:
     """Write `text` as UTF-8 with LF line ends, gzipped if `path` ends in .gz; whole or not at all."""
-    with whole_file(path) as partial:
+    try:
         data = text.encode()
+    except UnicodeEncodeError as error:
+        around = text[max(0, error.start - 20) : error.end + 20]
+        raise OutputError(f"{path}: a name in {around!r} is not UTF-8, and cannot be written; rename it") from error
+    with whole_file(path) as partial:
         # mtime=0: the same text gives the same bytes.
         partial.write_bytes(gzip.compress(data, mtime=0) if partial.suffix == ".gz" else data)
 
@@ -87,16 +98,88 @@ def read_text(path: Path, error: type[PlacerecError]) -> str:
         raise error(f"{path}:{line}: byte 0x{byte:02x} is not UTF-8; save the file as UTF-8") from cause
     except FileNotFoundError as cause:
         raise error(f"{path}: no such file") from cause
-    except (OSError, EOFError) as cause:
+    except IsADirectoryError as cause:
+        raise error(f"{path}: is a folder, and a file is expected; name a file in it") from cause
+    except (OSError, EOFError, zlib.error) as cause:
         raise error(f"{path}: cannot be read: {getattr(cause, 'strerror', None) or cause}") from cause
 
 
-def _entries(path: Path) -> list[Path]:
-    if not path.exists():
-        return []
-    if not path.is_dir():
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _check_replaceable(path: Path, target: Path, owned: tuple[str, ...]) -> None:
+    if not target.exists():
+        return
+    if not target.is_dir():
         raise OutputError(f"{path}: is a file, and a folder is to be written; name another folder or remove it")
-    return list(path.iterdir())
+    # A single file that a killed run did not finish is ours as well.
+    patterns = (*owned, PARTIAL.format("*") + "*")
+    foreign = sorted(
+        entry.name for entry in target.iterdir() if not any(fnmatch(entry.name, pattern) for pattern in patterns)
+    )
+    if foreign:
+        raise OutputError(f"{path}: holds {foreign[0]}, which this command does not write; name another folder")
+    if target == Path.cwd() or target.is_mount():
+        raise OutputError(f"{path}: is the current folder or a mounted one; name a folder in it")
+
+
+def _exchange(partial: Path, target: Path) -> None:
+    """Put `partial` where `target` is, which is moved away first and comes back if that fails."""
+    aside = Path(tempfile.mkdtemp(prefix=PARTIAL.format(target.name), dir=target.parent))
+    lock = _lock(aside)
+    old = aside / "old"
+    try:
+        while True:
+            shutil.rmtree(old, ignore_errors=True)
+            with suppress(FileNotFoundError):
+                target.replace(old)
+            try:
+                partial.replace(target)
+                return
+            except OSError as error:
+                # Another run has put its folder there since: that one goes too.
+                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                    raise
+    finally:
+        if old.exists() and not target.exists():
+            old.replace(target)
+        _unlock(lock)
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove the partial folders of `target` that no running process holds."""
+    prefix = PARTIAL.format(target.name)
+    for entry in target.parent.iterdir():
+        if entry.name.startswith(prefix) and entry.is_dir():
+            lock = _lock(entry)
+            if lock is not None:
+                shutil.rmtree(entry, ignore_errors=True)
+                _unlock(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """An open lock on a folder, None if another process has it; the system drops it however its process ends."""
+    if sys.platform == "win32":
+        return None
+    handle = None
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        _unlock(handle)
+        return None
+    return handle
+
+
+def _unlock(lock: int | None) -> None:
+    if lock is not None:
+        os.close(lock)
 
 
 def _umask() -> int:

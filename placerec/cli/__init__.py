@@ -1,7 +1,9 @@
 """The command line: one file per command, which parses, calls one library function and shows what it gave."""
 
+import io
 import os
 import sys
+from typing import Any
 
 import click
 
@@ -28,7 +30,38 @@ Your own images, in five commands:
 """
 
 
-@click.group(epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
+class Failure(click.ClickException):
+    """An error as one line on stderr, and exit code 1."""
+
+    def show(self, file: Any = None) -> None:
+        line = self.message.replace("\r", "\\r").replace("\n", "\\n")
+        click.echo(f"placerec: {line}", file=file, err=True)
+
+
+class Commands(click.Group):
+    """The one place where what goes wrong becomes a line on stderr and an exit code."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except PlacerecError as error:
+            raise Failure(str(error)) from error
+        except KeyboardInterrupt as error:
+            raise Failure("interrupted") from error
+        except BrokenPipeError:
+            # The reader (`| head`) has enough. Without this, Python complains when it closes stdout.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            ctx.exit(0)
+        except UnicodeEncodeError as error:
+            wanted = f"{error.object[error.start : error.end]!r} cannot be written as {error.encoding}"
+            raise Failure(f"{wanted}; set PYTHONUTF8=1, or rename what holds it") from error
+        except OSError as error:
+            raise Failure(f"{error.filename or 'standard output'}: {error.strerror or error}") from error
+        except MemoryError as error:
+            raise Failure(f"not enough memory ({error}); give less at a time") from error
+
+
+@click.group(cls=Commands, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="placerec")
 def commands() -> None:
     """Which place is the camera in? Images become words, places become language models."""
@@ -39,22 +72,10 @@ for command in (describe, train_words, tokenize, train_lm, decode, evaluate, ins
 
 
 def main() -> None:
-    """Run the command line; the one place where an error becomes a line on stderr and an exit code."""
-    try:
-        commands.main(prog_name="placerec", standalone_mode=False)
-    except click.UsageError as error:
-        error.show()
-        sys.exit(2)
-    except click.ClickException as error:
-        error.show()
-        sys.exit(1)
-    except PlacerecError as error:
-        click.echo(f"placerec: {error}", err=True)
-        sys.exit(1)
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("placerec: interrupted", err=True)
-        sys.exit(1)
-    except BrokenPipeError:
-        # The reader (`| head`) has enough. Without this, Python complains when it closes stdout.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+    """Run the command line: UTF-8 in and out whatever the locale, so that files and pipes hold the same bytes."""
+    for stream, errors in ((sys.stdin, "replace"), (sys.stdout, "surrogateescape"), (sys.stderr, "backslashreplace")):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding="utf-8", errors=errors)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(newline="\n")
+    commands.main(prog_name="placerec")

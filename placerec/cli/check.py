@@ -11,10 +11,13 @@ from placerec.cli.options import PATH, json_option, talk_options
 
 @click.command(epilog="Example: placerec check model/*.arpa")
 @click.argument("models", metavar="MODEL.arpa...", nargs=-1, required=True, type=PATH)
-@json_option
+@json_option()
 @talk_options
 def check(models: tuple[Path, ...], as_json: bool) -> None:
-    """Prove that every context of a model sums to 1, and that KenLM gives every token the same probability."""
+    """Check that a model sums to 1 and agrees with KenLM.
+
+    The probabilities after every context must sum to 1, and KenLM must give every token the same one.
+    """
     import json
 
     from placerec.lm.checks import check_model

@@ -5,20 +5,27 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import PATH, json_option, output_option, talk_options
+from placerec.cli.options import (
+    PATH,
+    PATH_OR_STREAM,
+    FiniteRange,
+    format_option,
+    json_option,
+    output_option,
+    progress_bar,
+    talk_options,
+    words_option,
+)
 
 
 @click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
-@click.argument(
-    "tokens", metavar="TOKENS...", nargs=-1, required=True, type=click.Path(path_type=Path, allow_dash=True)
-)
+@click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH_OR_STREAM)
 @click.option("-m", "--model", metavar="MODEL/", type=PATH, required=True, help="The folder of train-lm.")
-@click.option(
-    "-w", "--words", metavar="words.npz", type=PATH, default=None, help="The dictionary, if TOKENS are images."
-)
+@words_option(False, "The dictionary, if TOKENS are images.")
+@format_option(" of images")
 @click.option(
     "--stay",
-    type=click.FloatRange(0, 1),
+    type=FiniteRange(0, 1),
     default=0.99,
     show_default=True,
     help="Probability of staying in a place at each selected word.",
@@ -30,13 +37,16 @@ from placerec.cli.options import PATH, json_option, output_option, talk_options
     show_default=True,
     help="What computes the probabilities.",
 )
-@json_option
-@output_option(required=False, metavar="beliefs/", text="The folder to write; one sequence may go to stdout.")
+@json_option("Write one JSON object per frame instead of tab-separated lines.")
+@output_option(
+    "beliefs/", "The folder to write: one file per sequence. Without it, one sequence goes to stdout.", False
+)
 @talk_options
 def decode(
     tokens: tuple[Path, ...],
     model: Path,
     words: Path | None,
+    format_: str,
     stay: float,
     scorer: str,
     as_json: bool,
@@ -50,15 +60,28 @@ def decode(
     from placerec.model import decode as run
     from placerec.model import decode_lines, format_beliefs, load_recognizer
 
-    if [str(path) for path in tokens] == ["-"]:
+    if tokens == (Path("-"),):
         if words or out:
             raise click.UsageError("`-` reads words and answers on stdout: it takes neither -w nor -o")
+        if sys.stdin is None:
+            raise click.UsageError("`-` reads standard input, and that is closed")
         recognizer = load_recognizer(model, stay=stay, scorer=scorer)
         for line in decode_lines(recognizer, sys.stdin, as_json=as_json):
             click.echo(line)
         return
     if Path("-") in tokens:
         raise click.UsageError("`-` cannot be mixed with files")
-    beliefs = run(tokens, model, words=words, out=out, stay=stay, scorer=scorer, as_json=as_json)
+    with progress_bar("describe") as progress:
+        beliefs = run(
+            tokens,
+            model,
+            words=words,
+            out=out,
+            format=format_,
+            stay=stay,
+            scorer=scorer,
+            as_json=as_json,
+            progress=progress,
+        )
     if out is None:
         click.echo(format_beliefs(beliefs[0], as_json=as_json), nl=False)

@@ -8,13 +8,16 @@ from placerec.cli.options import output_option, progress_bar, talk_options
 
 
 @click.command(epilog="Example: placerec demo")
-@output_option(required=False, metavar="demo/", text="The folder to write.  [default: demo/]")
+@output_option("demo/", "The folder to write.  [default: demo/]", required=False)
 @click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the laboratory and the map."
 )
 @talk_options
 def demo(out: Path | None, seed: int) -> None:
-    """Show all of it on the synthetic laboratory: images, words, models, beliefs, and a page to look at."""
+    """Run all of it on the synthetic laboratory.
+
+    Images, words, models and beliefs, and at the end a page to look at.
+    """
     from placerec.demo import format_results, run_demo
 
     out = out or Path("demo")

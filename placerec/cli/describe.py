@@ -10,10 +10,14 @@ from placerec.cli.options import descriptor_options, output_option, progress_bar
 @click.command(epilog="Example: placerec describe COLD/seq1_cloudy1 -o descriptors.npz")
 @source_arguments
 @descriptor_options
-@output_option(metavar="FILE.npz", text="The file to write: arrays descriptors, frames, sequences, places, times.")
+@output_option("descriptors.npz", "The file to write: arrays descriptors, frames, sequences, places, times.")
 @talk_options
 def describe(sources: tuple[Path, ...], format_: str, variant: str, image_size: int, fit: str, out: Path) -> None:
-    """Write the GIST descriptor of every frame, for use elsewhere."""
+    """Write the GIST descriptor of every frame.
+
+    SOURCE is a sequence (a folder of images, with or without std_cam/ and localization/places.lst as in COLD), a
+    folder of sequences, or a folder with one folder of images per place.
+    """
     from placerec.vision import DescriptorSpec, describe_sources
 
     with progress_bar("describe") as progress:

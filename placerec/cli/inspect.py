@@ -14,10 +14,13 @@ from placerec.cli.options import PATH, json_option, talk_options
 @click.option(
     "--top", type=click.IntRange(min=0), default=5, show_default=True, help="How many n-grams of each order to show."
 )
-@json_option
+@json_option()
 @talk_options
 def inspect(model: Path, ngrams: tuple[str, ...], top: int, as_json: bool) -> None:
-    """Read a model: counts per order, its most frequent n-grams, context sums, and p(w | h) step by step."""
+    """Read a model: counts, top n-grams, sums, p(w | h).
+
+    NGRAM is some words in quotes: the probability of the last one after the others is shown step by step.
+    """
     from placerec.lm.inspection import format_inspection, inspect_model
 
     inspection = inspect_model(model, ngrams, top=top)

@@ -21,7 +21,10 @@ from placerec.cli.options import PATH, progress_bar, talk_options
 )
 @talk_options
 def lab(out: Path, scale: str, seed: int) -> None:
-    """Render the synthetic laboratory: 18 image sequences of five places, in COLD's layout."""
+    """Render the synthetic laboratory, in COLD's layout.
+
+    18 image sequences of five places: two paths, three illuminations, three runs of each.
+    """
     from placerec.lab import render_lab
 
     with progress_bar("render") as progress:

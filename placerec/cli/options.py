@@ -2,6 +2,7 @@
 
 import functools
 import logging
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,9 +11,36 @@ from typing import Any
 
 import click
 
+from placerec.errors import PlacerecError
+
 Command = Callable[..., Any]
-PATH = click.Path(path_type=Path)
 log = logging.getLogger("placerec")
+
+
+class PathType(click.Path):
+    """A path as a Path; no empty text (a shell variable that is not set), and `-` only where it is a stream."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if str(value) == "":
+            self.fail("the path is empty", param, ctx)
+        if str(value) == "-" and not self.allow_dash:
+            self.fail("`-` is no stream here; name a path", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class FiniteRange(click.FloatRange):
+    """A range of numbers that NaN and infinity are not in."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number: float = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{number:g} is not a number that can be used", param, ctx)
+        return number
+
+
+PATH = PathType(path_type=Path)
+PATH_OR_STREAM = PathType(path_type=Path, allow_dash=True)
+FILE = PathType(path_type=Path, dir_okay=False)
 
 
 class _Talk(logging.Formatter):
@@ -32,11 +60,25 @@ def talk_options(function: Command) -> Command:
     def talking(*args: Any, quiet: bool, verbose: bool, **options: Any) -> Any:
         handler = logging.StreamHandler(sys.stderr)
         handler.setFormatter(_Talk())
-        log.handlers = [handler]
+        log.addHandler(handler)
         log.setLevel(logging.ERROR if quiet else logging.DEBUG if verbose else logging.INFO)
-        return function(*args, **options)
+        try:
+            return function(*args, **options)
+        finally:
+            # Who calls the command line from Python keeps the logging that they had.
+            log.removeHandler(handler)
+            log.setLevel(logging.NOTSET)
 
     return talking
+
+
+@contextmanager
+def usage(option: str) -> Iterator[None]:
+    """What the library says of a value within is an error of usage: the value of `option` is not understood."""
+    try:
+        yield
+    except PlacerecError as error:
+        raise click.BadParameter(str(error), ctx=click.get_current_context(), param_hint=repr(option)) from error
 
 
 @contextmanager
@@ -50,7 +92,7 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
             bars[0].__enter__()
         bars[0].update(done - bars[0].pos)
 
-    if not sys.stderr.isatty() or not log.isEnabledFor(logging.INFO):
+    if sys.stderr is None or not sys.stderr.isatty() or not log.isEnabledFor(logging.INFO):
         yield lambda done, total: None
         return
     try:
@@ -62,15 +104,20 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
 def source_arguments(function: Command) -> Command:
     """SOURCE... and --format: where images come from."""
-    function = click.option(
+    function = format_option()(function)
+    return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)(function)
+
+
+def format_option(note: str = "") -> Callable[[Command], Command]:
+    """--format: what a folder of folders of images is."""
+    return click.option(
         "--format",
         "format_",
         type=click.Choice(["auto", "sequences", "places"]),
         default="auto",
         show_default=True,
-        help="What a folder of folders is: sequences, or one folder per place.",
-    )(function)
-    return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)(function)
+        help=f"What a folder of folders{note} is: sequences, or one folder per place.",
+    )
 
 
 def descriptor_options(function: Command) -> Command:
@@ -80,10 +127,15 @@ def descriptor_options(function: Command) -> Command:
         type=click.Choice(["squash", "crop"]),
         default="squash",
         show_default=True,
-        help="How a picture becomes a square.",
+        help="How a picture becomes a square: stretched, or its middle.",
     )(function)
     function = click.option(
-        "--image-size", type=click.IntRange(min=8), default=128, show_default=True, help="Side of that square, pixels."
+        "--image-size",
+        # Above 1024 the filters alone take gigabytes, and the descriptor has no use for the detail.
+        type=click.IntRange(8, 1024),
+        default=128,
+        show_default=True,
+        help="Side of the square that is described, in pixels.",
     )(function)
     return click.option(
         "--variant",
@@ -94,13 +146,17 @@ def descriptor_options(function: Command) -> Command:
     )(function)
 
 
-def output_option(
-    required: bool = True, metavar: str = "PATH", text: str = "Where to write."
-) -> Callable[[Command], Command]:
-    """-o: the output, replaced whole if it exists."""
-    return click.option("-o", "--out", "out", metavar=metavar, type=PATH, required=required, help=text)
+def words_option(required: bool, text: str) -> Callable[[Command], Command]:
+    """-w: the visual dictionary."""
+    return click.option("-w", "--words", metavar="words.npz", type=PATH, required=required, help=text)
 
 
-def json_option(function: Command) -> Command:
+def output_option(metavar: str, text: str, required: bool = True) -> Callable[[Command], Command]:
+    """-o: the output, replaced whole if it exists; a folder if `metavar` ends in a slash, else a file."""
+    path = PATH if metavar.endswith("/") else FILE
+    return click.option("-o", "--out", metavar=metavar, type=path, required=required, help=text)
+
+
+def json_option(text: str = "Print JSON.") -> Callable[[Command], Command]:
     """--json: output for programs."""
-    return click.option("--json", "as_json", is_flag=True, help="Print JSON.")(function)
+    return click.option("--json", "as_json", is_flag=True, help=text)

@@ -4,16 +4,20 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import PATH, output_option, progress_bar, source_arguments, talk_options
+from placerec.cli.options import output_option, progress_bar, source_arguments, talk_options, words_option
 
 
 @click.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")
 @source_arguments
-@click.option("-w", "--words", metavar="words.npz", type=PATH, required=True, help="The dictionary of train-words.")
-@output_option(metavar="tokens/", text="The folder to write: one .tsv per sequence, and vocab.txt.")
+@words_option(True, "The dictionary of train-words.")
+@output_option("tokens/", "The folder to write: one .tsv per sequence, and vocab.txt.")
 @talk_options
 def tokenize(sources: tuple[Path, ...], format_: str, words: Path, out: Path) -> None:
-    """Write the visual word of every frame: one text file per sequence."""
+    """Write the visual word of every frame.
+
+    SOURCE is a sequence (a folder of images, with or without std_cam/ and localization/places.lst as in COLD), a
+    folder of sequences, or a folder with one folder of images per place.
+    """
     from placerec.words.tokenize import tokenize as run
 
     with progress_bar("tokenize") as progress:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import PATH, output_option, progress_bar, talk_options
+from placerec.cli.options import PATH, FiniteRange, output_option, progress_bar, talk_options, usage
 
 # The names of placerec.lm.SMOOTHINGS, written out: importing it would make --help wait for numpy.
 SMOOTHING_NAMES = ("witten-bell", "witten-bell-backoff", "lidstone", "lidstone-backoff")
@@ -24,20 +24,24 @@ SMOOTHING_NAMES = ("witten-bell", "witten-bell-backoff", "lidstone", "lidstone-b
 )
 @click.option(
     "--delta",
-    type=click.FloatRange(0, min_open=True),
+    type=FiniteRange(0, min_open=True),
     default=1.0,
     show_default=True,
     help="What lidstone adds to every count.",
 )
 @click.option(
-    "--select", default="none", show_default=True, metavar="RULE", help="none, unique, subsample:S or compress:M."
+    "--select",
+    default="none",
+    show_default=True,
+    metavar="RULE",
+    help="Which words count: none (all), unique (one a run), subsample:S (one in S), compress:M (runs by M).",
 )
 @click.option(
     "--min-count",
     default="1",
     show_default=True,
     metavar="N[,N...]|srilm",
-    help="Per order, how often an n-gram must occur to be listed.",
+    help="Per order, how often an n-gram must occur to be listed; srilm is 1,1,2.",
 )
 @click.option(
     "--markers/--no-markers", default=False, show_default=True, help="Whether to count <s> and </s> around visits."
@@ -49,7 +53,7 @@ SMOOTHING_NAMES = ("witten-bell", "witten-bell-backoff", "lidstone", "lidstone-b
     default=None,
     help="All words, one a line.  [default: vocab.txt beside TOKENS]",
 )
-@output_option(metavar="MODEL/", text="The folder to write: one ARPA file per place, and what made it.")
+@output_option("MODEL/", "The folder to write: one ARPA file per place, and what made it.")
 @talk_options
 def train_lm(
     tokens: tuple[Path, ...],
@@ -62,7 +66,7 @@ def train_lm(
     vocab: Path | None,
     out: Path,
 ) -> None:
-    """Train one n-gram language model per place, written as ARPA files.
+    """Train one n-gram model per place, as ARPA files.
 
     TOKENS are token streams (.tsv), folders of them, or one folder of sentences: PLACE.txt, one visit a line.
     """
@@ -70,6 +74,10 @@ def train_lm(
     from placerec.model import train_lm as run
     from placerec.words import parse_selection
 
-    options = Options(order, smoothing, delta, parse_min_count(min_count), markers, parse_selection(select))
+    with usage("--min-count"):
+        minima = parse_min_count(min_count)
+    with usage("--select"):
+        selection = parse_selection(select)
+    options = Options(order, smoothing, delta, minima, markers, selection)
     with progress_bar("train-lm") as progress:
         run(tokens, out, options=options, vocabulary=vocab, progress=progress)

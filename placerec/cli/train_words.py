@@ -4,7 +4,14 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import descriptor_options, output_option, progress_bar, source_arguments, talk_options
+from placerec.cli.options import (
+    FiniteRange,
+    descriptor_options,
+    output_option,
+    progress_bar,
+    source_arguments,
+    talk_options,
+)
 
 
 @click.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
@@ -12,11 +19,17 @@ from placerec.cli.options import descriptor_options, output_option, progress_bar
 @click.option(
     "--size", type=click.IntRange(2, 200), default=10, show_default=True, help="Side of the map: size x size words."
 )
-@click.option("--components", type=click.IntRange(min=1), default=80, show_default=True, help="Principal components.")
+@click.option(
+    "--components",
+    type=click.IntRange(min=1),
+    default=80,
+    show_default=True,
+    help="Principal components that the map sees.",
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Another seed, another map.")
 @click.option(
     "--fraction",
-    type=click.FloatRange(0, 1, min_open=True),
+    type=FiniteRange(0, 1, min_open=True),
     default=1.0,
     show_default=True,
     help="Share of the frames to train on, drawn by the seed.",
@@ -35,7 +48,7 @@ from placerec.cli.options import descriptor_options, output_option, progress_bar
     help="Whether units that no training frame hit can be words.",
 )
 @descriptor_options
-@output_option(metavar="words.npz", text="The dictionary to write.")
+@output_option("words.npz", "The dictionary to write.")
 @talk_options
 def train_words(
     sources: tuple[Path, ...],
@@ -51,7 +64,11 @@ def train_words(
     fit: str,
     out: Path,
 ) -> None:
-    """Learn the visual words: PCA and a self-organising map over GIST descriptors."""
+    """Learn visual words: PCA and a map of descriptors.
+
+    SOURCE is a sequence (a folder of images, with or without std_cam/ and localization/places.lst as in COLD), a
+    folder of sequences, or a folder with one folder of images per place.
+    """
     from placerec.vision import DescriptorSpec, train_dictionary
 
     with progress_bar("describe") as progress:

@@ -118,7 +118,7 @@ class Recognizer:
         if len(words) < len(stream):
             strange = next(word for word in stream.words if word not in self._words)
             log.warning(
-                "%s: %d words skipped that the models do not list, %r first",
+                "%s: words that the models do not list: %d skipped, %r first",
                 stream.name,
                 len(stream) - len(words),
                 strange,
@@ -130,7 +130,7 @@ class Recognizer:
         filtered = filter_stream(log10_p, self.transition)
         if filtered.unexplained:
             log.warning(
-                "%s: %d words that no place explains left the prediction as it was", stream.name, filtered.unexplained
+                "%s: words that no place explains: %d left the prediction as it was", stream.name, filtered.unexplained
             )
         before_first = np.full((1, len(self.places)), 1 / len(self.places))
         belief = np.concatenate([before_first, filtered.belief])[np.cumsum(selected)]

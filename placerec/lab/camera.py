@@ -5,7 +5,7 @@ as one map of atlas positions and sampled once, which is what makes it quick.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -50,12 +50,16 @@ class _Frame:
     depth: Array
 
 
-def look(scene: Scene, cam: Camera, pose: tuple[float, float, float]) -> NDArray[np.uint8]:
-    """The picture (height, width, 3) uint8 RGB seen from pose (x, y, heading in radians), coded as the atlas is."""
+def look(scene: Scene, cam: Camera, pose: tuple[float, float, float], pitch: float = 0.0) -> NDArray[np.uint8]:
+    """The picture (height, width, 3) uint8 RGB seen from pose (x, y, heading), coded as the atlas is.
+
+    Angles in radians; a small `pitch` (up is positive) moves the horizon, without the tilt of uprights.
+    """
     x, y, a = pose
     turn = np.array([[np.cos(a), np.sin(a)], [np.sin(a), -np.cos(a)]], np.float32)
     standing, level = (_seen_from(p, np.array([x, y]), turn) for p in (scene.upright, scene.level))
-    frame = _cast(scene, cam, standing, level)
+    tilted = replace(cam, rows=cam.rows - np.float32(np.tan(pitch)))
+    frame = _cast(scene, tilted, standing, level)
     picture = cv2.remap(scene.atlas, frame.u, frame.v, cv2.INTER_LINEAR)
     small = cv2.resize(picture, (cam.width, cam.height), interpolation=cv2.INTER_AREA)
     return np.asarray(small, np.uint8)

@@ -42,7 +42,7 @@ class Scale:
 SCALES = {
     "tiny": Scale(160, 120, 50, 1.5, Timing({"seq3": (38, 44), "seq4": (56, 64)}, 0.6, 0.8, 0.01, brief=True)),
     "small": Scale(160, 120, 60, 2.0, Timing({"seq3": (105, 121), "seq4": (150, 174)}, 0.38, 0.7, 0.015)),
-    "paper": Scale(320, 240, 80, 1.5, Timing({"seq3": (720, 860), "seq4": (1000, 1110)}, 0.13, 0.4, 0.02)),
+    "paper": Scale(320, 240, 80, 1.5, Timing({"seq3": (720, 860), "seq4": (1000, 1110)}, 0.13, 0.4, 0.06)),
 }
 
 
@@ -80,7 +80,7 @@ def render(
 
 @dataclass(frozen=True)
 class Run:
-    """One sequence before it is rendered: panels, light, poses (n, 3), time stamps (n,), and what draws its noise."""
+    """One sequence before it is rendered: panels, light, poses (n, 4), time stamps (n,), and what draws its noise."""
 
     panels: tuple[Panel, ...]
     light: Illumination
@@ -109,8 +109,8 @@ def _record(folder: Path, run: Run, painted: Paint, scale: Scale) -> Iterator[No
         (folder / part).mkdir(parents=True)
     lines: list[str] = []
     exposure = 0.0
-    for (x, y, heading), time in zip(run.poses.tolist(), run.times.tolist(), strict=True):
-        coded = look(scene, cam, (x, y, heading))
+    for (x, y, heading, pitch), time in zip(run.poses.tolist(), run.times.tolist(), strict=True):
+        coded = look(scene, cam, (x, y, heading), pitch)
         wanted = run.light.exposure * (MIDDLE_GREY / mean_radiance(coded)) ** 0.5
         # Automatic exposure takes a few frames to follow.
         exposure = wanted if not lines else exposure + 0.4 * (wanted - exposure)

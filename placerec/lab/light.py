@@ -40,9 +40,9 @@ INDOORS = {"corridor": 0.8, "washroom": 1.0, "toilet": 0.7}
 ALL_ON = {"corridor": 0.75, "washroom": 1.0, "toilet": 0.9, "printer": 0.8, "kitchen": 0.9, "office": 0.8}
 
 ILLUMINATIONS = {
-    "cloudy": Illumination("cloudy", 1.5, 0.0, _sun(235, 35), INDOORS, (1.0, 1.0, 1.0), 1.0, 1.6),
-    "night": Illumination("night", 0.01, 0.0, _sun(235, 35), ALL_ON, (1.06, 1.0, 0.84), 0.72, 2.6),
-    "sunny": Illumination("sunny", 2.8, 6.0, _sun(232, 33), INDOORS, (1.03, 1.0, 0.95), 1.15, 1.4),
+    "cloudy": Illumination("cloudy", 1.5, 0.0, _sun(235, 35), INDOORS, (1.0, 1.0, 1.0), 1.0, 2.0),
+    "night": Illumination("night", 0.01, 0.0, _sun(235, 35), ALL_ON, (1.06, 1.0, 0.84), 0.72, 3.2),
+    "sunny": Illumination("sunny", 2.8, 6.0, _sun(232, 33), INDOORS, (1.03, 1.0, 0.95), 1.15, 1.8),
 }
 
 

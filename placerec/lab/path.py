@@ -123,7 +123,7 @@ def clear(track: Track, outline: NDArray[np.float64], gap: float = CLEARANCE) ->
 
 
 def drive(path: str, outline: NDArray[np.float64], timing: Timing, rng: np.random.Generator) -> Track:
-    """Poses (frames, 3) of one run of `path`: x, y in metres, heading in radians, free of collisions.
+    """Poses (frames, 4) of one run of `path`: x, y in metres, heading and pitch in radians, free of collisions.
 
     Raises RuntimeError if no free tour is found: the floor plan is then wrong.
     """
@@ -135,10 +135,22 @@ def drive(path: str, outline: NDArray[np.float64], timing: Timing, rng: np.rando
     else:
         raise RuntimeError("the laboratory has no free way for the robot")
     poses = track[_schedule(path, track, timing, rng)]
-    # Driving shakes the camera a little; standing, it is quiet.
-    moving = np.concatenate([[0.0], np.hypot(*np.diff(poses[:, :2], axis=0).T) > 1e-9])
-    poses[:, 2] += rng.normal(0, timing.wobble, len(poses)) * moving
-    return poses
+    return _shaken(poses, timing, rng)
+
+
+def _shaken(poses: Track, timing: Timing, rng: np.random.Generator) -> Track:
+    """The poses with a heading that weaves about the way, and a pitch as a fourth column; standing, both are quiet."""
+    shaken = np.column_stack([poses, np.zeros(len(poses))])
+    drawn = rng.normal(0, timing.wobble, (len(poses), 2))
+    off = 0.0
+    for i in range(1, len(poses)):
+        if np.array_equal(poses[i], poses[i - 1]):
+            shaken[i, 3] = shaken[i - 1, 3]
+        else:
+            off = 0.7 * off + float(drawn[i, 0])
+            shaken[i, 3] = 0.4 * float(drawn[i, 1])
+        shaken[i, 2] += off
+    return shaken
 
 
 def _schedule(path: str, track: Track, timing: Timing, rng: np.random.Generator) -> NDArray[np.intp]:
@@ -164,8 +176,8 @@ def _lengths(
     means = np.array([next(corridor) if v == "CR-B" else MEAN_FRAMES[v] for v in visits])
     spread = np.array([VARIATION[v] for v in visits])
     drawn = rng.gamma(spread**-2, means * spread**2)
-    # No faster than twice the tour's mean speed, or a short visit would be a jump.
-    drawn = np.maximum(drawn, 0.5 * efforts / efforts.sum() * means.sum())
+    # Not much faster than the tour's mean speed, or a short visit would be a jump.
+    drawn = np.maximum(drawn, 0.7 * efforts / efforts.sum() * means.sum())
     low, high = timing.frames[path]
     total = int(rng.integers(low, high + 1))
     return np.asarray(np.maximum(2, np.round(drawn / drawn.sum() * total)), np.int64)
@@ -174,7 +186,7 @@ def _lengths(
 def _paces(count: int, timing: Timing, rng: np.random.Generator) -> NDArray[np.float64]:
     """Relative way of each frame of a visit: a slowly changing speed, with stops of a few frames."""
     speed = np.exp(timing.pace * np.convolve(rng.normal(0, 1, count + 4), np.ones(5) / 5**0.5, mode="valid"))
-    speed = np.minimum(speed, 3 * np.median(speed))
+    speed = np.minimum(speed, 2 * np.median(speed))
     # Stops last four frames on average; started this often, they fill the share that is asked for.
     chance, stop = timing.still / (4 * (1 - timing.still)), 0
     for i in range(1, count):

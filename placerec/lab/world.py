@@ -5,7 +5,7 @@ of Saarbruecken: a corridor, the toilet and the kitchen north of it, the office 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +96,51 @@ DOORWAYS = (
 WINDOW_KINDS = ("window", "frosted")
 
 
+# Where the builder put doors, windows and what is screwed to the walls.
+FIXED = (
+    Fixture("corridor", "west", "window", 0.45, 0.9, 1.1, 1.3),
+    Fixture("corridor", "east", "window", 0.45, 0.9, 1.1, 1.3),
+    Fixture("corridor", "north", "closed door", 3.2, 0.0, 1.06, 2.1),
+    Fixture("corridor", "north", "closed door", 5.9, 0.0, 1.06, 2.1),
+    Fixture("corridor", "south", "closed door", 2.0, 0.0, 1.06, 2.1),
+    Fixture("corridor", "south", "closed door", 9.4, 0.0, 1.06, 2.1),
+    Fixture("corridor", "south", "closed door", 12.3, 0.0, 1.06, 2.1),
+    Fixture("printer", "west", "window", 0.7, 0.9, 1.2, 1.3),
+    Fixture("printer", "west", "radiator", 0.75, 0.12, 1.1, 0.6),
+    Fixture("washroom", "west", "mirror", 0.25, 1.05, 1.3, 0.8),
+    Fixture("washroom", "east", "white", 0.45, 1.1, 0.3, 0.4),
+    Fixture("washroom", "east", "steel", 1.1, 1.15, 0.26, 0.3),
+    Fixture("toilet", "west", "frosted", 0.6, 1.35, 0.9, 0.85),
+    Fixture("kitchen", "north", "window", 1.15, 1.15, 0.95, 1.0),
+    Fixture("kitchen", "east", "window", 1.3, 0.9, 2.2, 1.35),
+    Fixture("kitchen", "east", "radiator", 1.7, 0.12, 1.4, 0.6),
+    Fixture("office", "south", "window", 0.45, 0.9, 2.25, 1.35),
+    Fixture("office", "south", "radiator", 0.7, 0.12, 1.6, 0.6),
+    Fixture("corridor", "north", "switch", 8.3, 1.1, 0.09, 0.09),
+    Fixture("washroom", "south", "switch", 0.3, 1.1, 0.09, 0.09),
+    Fixture("office", "north", "switch", 2.4, 1.1, 0.09, 0.09),
+)
+
+# What people hang up: no two laboratories have it in quite the same places.
+HUNG = (
+    Fixture("corridor", "north", "board", 4.55, 1.0, 1.1, 1.0),
+    Fixture("corridor", "north", "poster", 7.5, 1.05, 0.6, 0.85),
+    Fixture("corridor", "north", "poster", 10.9, 1.05, 0.7, 1.0),
+    Fixture("corridor", "south", "poster", 4.2, 1.05, 0.7, 1.0),
+    Fixture("corridor", "south", "board", 7.4, 1.0, 1.3, 1.0),
+    Fixture("corridor", "south", "extinguisher", 8.95, 0.9, 0.22, 0.6),
+    Fixture("corridor", "south", "poster", 10.9, 1.05, 0.6, 0.85),
+    Fixture("printer", "east", "board", 0.5, 1.15, 1.2, 0.9),
+    Fixture("printer", "north", "poster", 1.65, 1.25, 0.55, 0.8),
+    Fixture("kitchen", "west", "board", 2.2, 1.5, 1.1, 0.8),
+    Fixture("kitchen", "west", "poster", 0.6, 1.55, 0.6, 0.8),
+    Fixture("kitchen", "south", "poster", 0.25, 1.5, 0.6, 0.8),
+    Fixture("office", "west", "poster", 3.4, 1.1, 0.6, 0.85),
+    Fixture("office", "east", "board", 1.4, 1.2, 1.2, 0.9),
+    Fixture("office", "north", "poster", 0.2, 1.1, 0.6, 0.85),
+)
+
+
 def place(x: float, y: float) -> str:
     """COLD's label of a point on the floor; doorways are split in the middle of the wall, as in COLD's files."""
     if abs(y) <= 1.1:
@@ -106,51 +151,8 @@ def place(x: float, y: float) -> str:
 
 
 def fixtures(rng: np.random.Generator) -> tuple[Fixture, ...]:
-    """What hangs on the walls; `rng` moves posters and boards, doors and windows stay where the builder put them."""
-    fixed = (
-        Fixture("corridor", "west", "window", 0.45, 0.9, 1.1, 1.3),
-        Fixture("corridor", "east", "window", 0.45, 0.9, 1.1, 1.3),
-        Fixture("corridor", "north", "closed door", 3.2, 0.0, 1.06, 2.1),
-        Fixture("corridor", "north", "closed door", 5.9, 0.0, 1.06, 2.1),
-        Fixture("corridor", "south", "closed door", 2.0, 0.0, 1.06, 2.1),
-        Fixture("corridor", "south", "closed door", 9.4, 0.0, 1.06, 2.1),
-        Fixture("corridor", "south", "closed door", 12.3, 0.0, 1.06, 2.1),
-        Fixture("printer", "west", "window", 0.7, 0.9, 1.2, 1.3),
-        Fixture("printer", "west", "radiator", 0.75, 0.12, 1.1, 0.6),
-        Fixture("washroom", "west", "mirror", 0.25, 1.05, 1.3, 0.8),
-        Fixture("washroom", "east", "white", 0.45, 1.1, 0.3, 0.4),
-        Fixture("washroom", "east", "steel", 1.1, 1.15, 0.26, 0.3),
-        Fixture("toilet", "west", "frosted", 0.6, 1.35, 0.9, 0.85),
-        Fixture("kitchen", "north", "window", 1.15, 1.15, 0.95, 1.0),
-        Fixture("kitchen", "east", "window", 1.3, 0.9, 2.2, 1.35),
-        Fixture("kitchen", "east", "radiator", 1.7, 0.12, 1.4, 0.6),
-        Fixture("office", "south", "window", 0.45, 0.9, 2.25, 1.35),
-        Fixture("office", "south", "radiator", 0.7, 0.12, 1.6, 0.6),
-    )
-    hung = (
-        ("corridor", "north", "board", 4.55, 1.0, 1.1, 1.0),
-        ("corridor", "north", "poster", 7.5, 1.05, 0.6, 0.85),
-        ("corridor", "north", "poster", 10.9, 1.05, 0.7, 1.0),
-        ("corridor", "south", "poster", 4.2, 1.05, 0.7, 1.0),
-        ("corridor", "south", "board", 7.4, 1.0, 1.3, 1.0),
-        ("corridor", "south", "extinguisher", 8.95, 0.9, 0.22, 0.6),
-        ("corridor", "south", "poster", 10.9, 1.05, 0.6, 0.85),
-        ("printer", "east", "board", 0.5, 1.15, 1.2, 0.9),
-        ("printer", "north", "poster", 1.65, 1.25, 0.55, 0.8),
-        ("kitchen", "west", "board", 2.2, 1.5, 1.1, 0.8),
-        ("kitchen", "west", "poster", 0.6, 1.55, 0.6, 0.8),
-        ("kitchen", "south", "poster", 0.25, 1.5, 0.6, 0.8),
-        ("office", "west", "poster", 3.4, 1.1, 0.6, 0.85),
-        ("office", "east", "board", 1.4, 1.2, 1.2, 0.9),
-        ("office", "north", "poster", 0.2, 1.1, 0.6, 0.85),
-    )
-    switches = (
-        ("corridor", "north", 8.3),
-        ("washroom", "south", 0.3),
-        ("office", "north", 2.4),
-    )
-    loose = tuple(Fixture(*h[:3], h[3] + float(rng.uniform(-0.12, 0.12)), *h[4:]) for h in hung)
-    return fixed + loose + tuple(Fixture(r, s, "switch", at, 1.1, 0.09, 0.09) for r, s, at in switches)
+    """What is on the walls; `rng` moves posters and boards."""
+    return FIXED + tuple(replace(f, at=f.at + float(rng.uniform(-0.12, 0.12))) for f in HUNG)
 
 
 def walls(rng: np.random.Generator) -> list[Panel]:

@@ -33,7 +33,7 @@ def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5)
         "lowest_sum": float(sums.min()),
         "highest_sum": float(sums.max()),
         "most_frequent": [most_frequent(model, n, top) for n in range(1, model.order + 1)],
-        "explained": [explain(model, ngram.split()) for ngram in ngrams],
+        "explained": [_explained(path, model, ngram) for ngram in ngrams],
     }
 
 
@@ -49,6 +49,13 @@ def most_frequent(model: BackoffModel, n: int, top: int) -> list[dict[str, Any]]
     first = np.argsort(-joint, kind="stable")[:top]
     texts = model.trie.texts(n) if len(first) else []
     return [{"ngram": texts[row], "p": _finite(10 ** float(joint[row]))} for row in first.tolist()]
+
+
+def _explained(path: Path | str, model: BackoffModel, ngram: str) -> dict[str, Any]:
+    try:
+        return explain(model, ngram.split())
+    except LanguageModelError as error:
+        raise LanguageModelError(f"{path}: {error}") from error
 
 
 def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from placerec.model.corpus import Corpus, read_corpus
 from placerec.model.decode import decode, decode_lines, format_beliefs
-from placerec.model.load import PlaceModels, load_model, load_recognizer
+from placerec.model.load import PlaceModels, load_model, load_recognizer, make_recognizer
 from placerec.model.train import Options, parse_min_count, train_lm, train_model, train_place
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "format_beliefs",
     "load_model",
     "load_recognizer",
+    "make_recognizer",
     "parse_min_count",
     "read_corpus",
     "train_lm",

@@ -1,6 +1,7 @@
 """What TOKENS on a command line name: token stream files, folders of them, or a folder of sentences."""
 
 import json
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 from placerec.errors import StreamError
 from placerec.files import read_text
 from placerec.frames.naming import unique_names
+from placerec.frames.places import check_place, check_twins
 from placerec.words import (
     Selection,
     Sentences,
@@ -24,6 +26,14 @@ VOCABULARY = "vocab.txt"
 
 
 @dataclass(frozen=True)
+class TokenMaker:
+    """The dictionary that made token streams, and a folder of them that says so."""
+
+    folder: Path
+    fingerprint: str
+
+
+@dataclass(frozen=True)
 class Corpus:
     """Sentences per place with their vocabulary, ready for training."""
 
@@ -34,16 +44,18 @@ class Corpus:
 
 
 def stream_files(sources: Iterable[Path | str]) -> list[Path]:
-    """The token stream files that `sources` (files, or folders of .tsv files) name, in order."""
-    files: list[Path] = []
+    """The token stream files that `sources` (files, or folders of .tsv files) name, in order; none of them twice."""
+    files: dict[str, Path] = {}
     for source in map(Path, sources):
         if not source.exists():
             raise StreamError(f"{source}: no such file or folder; token streams (.tsv) are expected")
         found = sorted(p for p in source.iterdir() if p.name.endswith(STREAM_SUFFIXES)) if source.is_dir() else [source]
         if not found:
-            raise StreamError(f"{source}: holds no token stream (.tsv); `placerec tokenize` writes them")
-        files += found
-    return files
+            raise StreamError(f"{source}: holds no token stream (.tsv); `placerec tokenize` makes them of images")
+        for path in found:
+            if files.setdefault(os.path.abspath(path), path) is not path:
+                raise StreamError(f"{path}: is given twice; name each sequence once")
+    return list(files.values())
 
 
 def read_streams(sources: Iterable[Path | str]) -> list[WordStream]:
@@ -68,15 +80,15 @@ def read_corpus(sources: Sequence[Path | str], *, selection: Selection, vocabula
         return _sentence_corpus(folder, vocabulary)
     files = stream_files(sources)
     words = read_vocabulary(vocabulary or _beside([path.parent for path in files]))
-    listed = frozenset(words)
+    made_by = dictionary_of(files)
     streams = read_streams(sources)
     for stream, path in zip(streams, files, strict=True):
-        for i, word in enumerate(stream.words):
-            if word not in listed:
-                raise StreamError(f"{path}: frame {stream.frames[i]}: the word {word!r} is not in the vocabulary")
-    return Corpus(
-        sentences_per_place(streams, selection), words, [s.name for s in streams], _dictionary(files[0].parent)
-    )
+        _check_listed(stream.words, frozenset(words), path)
+    # The first file of each place is enough to tell where its name stands.
+    first = {place: path for stream, path in reversed([*zip(streams, files, strict=True)]) for place in stream.places}
+    check_twins((place, _position(path, "place", place)) for place, path in first.items() if place)
+    sentences = sentences_per_place(streams, selection)
+    return Corpus(sentences, words, [s.name for s in streams], made_by.fingerprint if made_by else None)
 
 
 def _sentence_corpus(folder: Path, vocabulary: Path | str | None) -> Corpus:
@@ -84,15 +96,35 @@ def _sentence_corpus(folder: Path, vocabulary: Path | str | None) -> Corpus:
     if not files:
         raise StreamError(f"{folder}: holds neither token streams (.tsv) nor sentences (PLACE.txt)")
     words = read_vocabulary(vocabulary or _beside([folder, folder.resolve().parent]))
-    listed = frozenset(words)
+    check_twins((path.stem, str(path)) for path in files)
     sentences = {}
     for path in files:
+        if reason := check_place(path.stem):
+            raise StreamError(f"{path}: place {path.stem!r} {reason}; rename the file")
         sentences[path.stem] = read_sentences(path)
-        for visit in sentences[path.stem]:
-            for word in visit:
-                if word not in listed:
-                    raise StreamError(f"{path}: the word {word!r} is not in the vocabulary")
+        _check_listed((word for visit in sentences[path.stem] for word in visit), frozenset(words), path)
     return Corpus(sentences, words, [], None)
+
+
+def _check_listed(words: Iterable[str], listed: frozenset[str], path: Path) -> None:
+    for word in words:
+        if word not in listed:
+            position = _position(path, "word", word)
+            raise StreamError(f"{position}: the word {word!r} is not in the vocabulary; add it, or remove the line")
+
+
+def _position(path: Path, column: str, value: str) -> str:
+    """`path:line` of the first `value` in a column of a token stream, or among the words of a plain text."""
+    lines = read_text(path, StreamError).removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
+    header = lines[0].split("\t")
+    for number, line in enumerate(lines, start=1):
+        if "word" not in header:
+            found = line.split()
+        else:
+            found = line.split("\t")[header.index(column) :][:1] if number > 1 else []
+        if value in found:
+            return f"{path}:{number}"
+    return str(path)
 
 
 def _beside(folders: Iterable[Path]) -> Path:
@@ -103,8 +135,22 @@ def _beside(folders: Iterable[Path]) -> Path:
     raise StreamError(f"{tried[0]}: no such file; the vocabulary (all words, one a line) is named with --vocab FILE")
 
 
-def _dictionary(folder: Path) -> str | None:
-    """The fingerprint of the dictionary that made the tokens of a folder, None if it is not known."""
+def dictionary_of(files: Iterable[Path]) -> TokenMaker | None:
+    """The dictionary that made the token streams in `files`, None if it is not known.
+
+    Raises StreamError if there are two: the same word would mean different things.
+    """
+    makers = [maker for folder in dict.fromkeys(path.parent for path in files) if (maker := _maker(folder))]
+    for other in makers[1:]:
+        if other.fingerprint != makers[0].fingerprint:
+            raise StreamError(
+                f"{other.folder}: its words are of another dictionary than those of {makers[0].folder}; "
+                "tokenize both with one words.npz"
+            )
+    return makers[0] if makers else None
+
+
+def _maker(folder: Path) -> TokenMaker | None:
     path = folder / TOKENS_JSON
     if not path.exists():
         return None
@@ -112,4 +158,4 @@ def _dictionary(folder: Path) -> str | None:
         fingerprint = json.loads(read_text(path, StreamError))["dictionary"]
     except (ValueError, KeyError, TypeError) as error:
         raise StreamError(f"{path}: is no description of tokens; tokenize again") from error
-    return str(fingerprint)
+    return TokenMaker(folder, str(fingerprint))

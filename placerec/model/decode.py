@@ -3,17 +3,19 @@
 import json
 import logging
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from placerec.errors import ModelError, StreamError, at
+from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
 from placerec.hohmm import Beliefs, Recognizer, format_header, format_row
-from placerec.model.corpus import read_streams
-from placerec.model.load import load_recognizer
+from placerec.model.corpus import STREAM_SUFFIXES, dictionary_of, read_streams, stream_files
+from placerec.model.load import PlaceModels, load_model, make_recognizer
+from placerec.words import WordStream
 
 OWNED = ("*.tsv", "*.jsonl")
 log = logging.getLogger(__name__)
+Progress = Callable[[int, int], None]
 
 
 def decode(
@@ -22,35 +24,77 @@ def decode(
     *,
     words: Path | str | None = None,
     out: Path | str | None = None,
+    format: str = "auto",
     stay: float = 0.99,
     scorer: str = "native",
     as_json: bool = False,
+    progress: Progress | None = None,
 ) -> list[Beliefs]:
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
-    `sources`: token streams, or image sources if `words` (a words.npz) is given. Without `out` there must be one
-    sequence only. Raises ModelError or StreamError for what cannot be read.
+    `sources`: token streams, or image sources (of `format`) if `words` (a words.npz) is given. Without `out` there must
+    be one sequence only. Raises ModelError or StreamError for what cannot be read or does not belong together.
     """
-    if words is None:
-        streams = read_streams(sources)
-        recognizer = load_recognizer(model, stay=stay, scorer=scorer)
-    else:
-        # Only images need OpenCV and scipy.
-        from placerec.vision import Dictionary
-        from placerec.words.tokenize import streams_of
 
-        dictionary = Dictionary.load(Path(words))
-        recognizer = load_recognizer(model, stay=stay, scorer=scorer, dictionary=dictionary)
-        streams = streams_of(sources, dictionary)
-    if out is None and len(streams) > 1:
-        raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
-    decoded = [recognizer.decode(stream) for stream in streams]
-    if out is not None:
-        with whole_folder(Path(out), OWNED) as folder:
-            for beliefs in decoded:
-                suffix = "jsonl" if as_json else "tsv"
-                write_text(folder / f"{beliefs.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
-    return decoded
+    def decoded() -> list[Beliefs]:
+        models = load_model(model)
+        if words is None:
+            recognizer = make_recognizer(models, stay=stay, scorer=scorer)
+            streams = _token_streams(sources, models)
+        else:
+            recognizer, streams = _image_streams(sources, Path(words), models, format, stay, scorer, progress)
+        if out is None and len(streams) > 1:
+            raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
+        return [recognizer.decode(stream) for stream in streams]
+
+    if out is None:
+        return decoded()
+    _spare_sources(sources, Path(out))
+    with whole_folder(Path(out), OWNED) as folder:
+        found = decoded()
+        for beliefs in found:
+            suffix = "jsonl" if as_json else "tsv"
+            write_text(folder / f"{beliefs.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
+    log.info("%s: %d sequences, %d frames", out, len(found), sum(len(beliefs.frames) for beliefs in found))
+    return found
+
+
+def _token_streams(sources: Sequence[Path | str], models: PlaceModels) -> list[WordStream]:
+    made_by, trained_on = dictionary_of(stream_files(sources)), models.description["dictionary"]
+    if made_by and trained_on and made_by.fingerprint != trained_on:
+        raise StreamError(
+            f"{made_by.folder}: its words are of another dictionary than those that trained {models.path}; "
+            "tokenize with the words.npz of the training"
+        )
+    return read_streams(sources)
+
+
+def _image_streams(
+    sources: Sequence[Path | str],
+    words: Path,
+    models: PlaceModels,
+    format: str,
+    stay: float,
+    scorer: str,
+    progress: Progress | None,
+) -> tuple[Recognizer, list[WordStream]]:
+    # Only images need OpenCV and scipy.
+    from placerec.vision import Dictionary
+    from placerec.words.tokenize import streams_of
+
+    for source in sources:
+        if str(source).endswith(STREAM_SUFFIXES):
+            raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
+    dictionary = Dictionary.load(words)
+    recognizer = make_recognizer(models, stay=stay, scorer=scorer, dictionary=dictionary)
+    return recognizer, streams_of(sources, dictionary, format=format, progress=progress)
+
+
+def _spare_sources(sources: Sequence[Path | str], out: Path) -> None:
+    """Refuse to write over what is to be read: token streams and beliefs are called alike."""
+    for source in map(Path, sources):
+        if out.resolve() in (source.resolve(), source.resolve().parent):
+            raise OutputError(f"{out}: holds what is to be decoded ({source}); name another folder")
 
 
 def format_beliefs(beliefs: Beliefs, *, as_json: bool = False) -> str:
@@ -81,30 +125,37 @@ def decode_lines(recognizer: Recognizer, lines: Iterable[str], *, as_json: bool 
     strange = 0
     belief = recognizer.belief()
     for frame, line in enumerate(lines):
-        word, _, seconds = line.rstrip("\r\n").partition("\t")
-        word = word.strip()
-        time = _seconds(seconds, frame)
+        word, time = _word_and_seconds(line, frame)
+        selected = False
         if word in recognizer:
             belief = recognizer.update(word, time)
             selected = belief.selected
         else:
             if not strange:
-                log.warning("line %d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
+                log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
             strange += 1
-            selected = False
         probability = belief.probability.tolist()
         yield _line(recognizer.places, str(frame), time, "", word, selected, belief.best, probability, as_json=as_json)
     if strange:
-        log.warning("%d lines skipped whose words the models do not list", strange)
+        log.warning("<stdin>: lines skipped because the models do not list their word: %d", strange)
     if recognizer.unexplained:
-        log.warning("%d words that no place explains left the prediction as it was", recognizer.unexplained)
+        log.warning("<stdin>: words that no place explains, which left the prediction: %d", recognizer.unexplained)
 
 
-def _seconds(text: str, frame: int) -> float:
+def _word_and_seconds(line: str, frame: int) -> tuple[str, float]:
+    """The two fields of line `frame` (from 0), nan for no seconds."""
+    if frame == 0:
+        line = line.removeprefix("\ufeff")
+    word, _, seconds = line.rstrip("\r\n").partition("\t")
+    if not seconds.strip():
+        return word.strip(), math.nan
     try:
-        return float(text) if text.strip() else math.nan
+        time = float(seconds)
     except ValueError:
-        raise StreamError(at("<stdin>", frame + 1, f"time {text!r} is not a number of seconds")) from None
+        time = math.nan
+    if not math.isfinite(time):
+        raise StreamError(at("<stdin>", frame + 1, f"time {seconds!r} is not a number of seconds"))
+    return word.strip(), time
 
 
 def _line(

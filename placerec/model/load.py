@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from placerec.errors import ModelError, PlacerecError
 from placerec.files import read_text
+from placerec.frames.places import check_place
 from placerec.hohmm import Recognizer, fixed_transition
 from placerec.lm import BackoffModel, read_arpa
 from placerec.lm.external import kenlm_scorer
@@ -31,7 +32,9 @@ class PlaceModels:
 def load_model(path: Path | str) -> PlaceModels:
     """Read a MODEL/ folder; ModelError or LanguageModelError, naming the file, for anything missing or broken."""
     path = Path(path)
-    if not path.is_dir():
+    if path.exists() and not path.is_dir():
+        raise ModelError(f"{path}: is a file, and the folder of a model is expected; name the folder")
+    if not path.exists():
         raise ModelError(f"{path}: no such model folder; `placerec train-lm TOKENS... -o {path}` makes one")
     description = _read_description(path / "model.json")
     models = {}
@@ -52,10 +55,19 @@ def load_recognizer(
     images into words. `scorer`: `native`, or `kenlm` (MissingExtraError where it is not installed). Raises ModelError
     if the dictionary is not the one that made the training words.
     """
-    model = load_model(path)
+    return make_recognizer(load_model(path), stay=stay, dictionary=dictionary, scorer=scorer)
+
+
+def make_recognizer(
+    model: PlaceModels, *, stay: float = 0.99, dictionary: "Dictionary | None" = None, scorer: str = "native"
+) -> Recognizer:
+    """The recognizer of a model that is loaded; see `load_recognizer`."""
     trained_on = model.description["dictionary"]
     if dictionary is not None and trained_on is not None and dictionary.fingerprint != trained_on:
-        raise ModelError(f"{path}: was trained on the words of another dictionary than the one given; tokenize again")
+        raise ModelError(
+            f"{model.path}: was trained on the words of another dictionary than the one given; "
+            "give the words.npz of its training, or train it again"
+        )
     if scorer not in ("native", "kenlm"):
         raise ModelError(f"scorer {scorer!r} is unknown; choose native or kenlm")
     scorers = {place: kenlm_scorer(model.path / f"{place}.arpa") for place in model.models} if scorer == "kenlm" else {}
@@ -69,20 +81,26 @@ def load_recognizer(
 
 
 def _read_description(path: Path) -> dict[str, Any]:
+    """What model.json says; ModelError unless everything that `load_model` uses is there and usable."""
+    remedy = "train the model again"
+    if not path.exists():
+        raise ModelError(f"{path}: missing, so {path.parent} is no model of train-lm; {remedy}")
     try:
         description = json.loads(read_text(path, ModelError))
-        if description["format"] != FORMAT:
-            raise ModelError(f"{path}: format {description['format']!r} is not {FORMAT!r}; train the model again")
-        places = description["places"]
-        if not places or not all(isinstance(place, str) and Path(place).name == place for place in places):
-            raise ModelError(f"{path}: 'places' must list the names of places")
-        parse_selection(description["select"])
-        description["dictionary"]
-    except PlacerecError:
-        raise
-    except (ValueError, KeyError, TypeError) as error:
-        raise ModelError(
-            f"{path}: is no model description ({type(error).__name__}: {error}); train the model again"
-        ) from error
-    checked: dict[str, Any] = description
-    return checked
+    except ValueError as error:
+        raise ModelError(f"{path}: is no JSON ({error}); {remedy}") from error
+    if not isinstance(description, dict) or description.get("format") != FORMAT:
+        raise ModelError(f"{path}: is not of the format {FORMAT!r}; {remedy}")
+    places, dictionary = description.get("places"), description.get("dictionary", 0)
+    if not isinstance(places, list) or not places or len(set(map(str, places))) < len(places):
+        raise ModelError(f"{path}: 'places' must list the names of places, each once; {remedy}")
+    for place in places:
+        if reason := check_place(str(place)):
+            raise ModelError(f"{path}: place {place!r} {reason}; {remedy}")
+    if dictionary is not None and not isinstance(dictionary, str):
+        raise ModelError(f"{path}: 'dictionary' must be a fingerprint or null; {remedy}")
+    try:
+        parse_selection(str(description.get("select")))
+    except PlacerecError as error:
+        raise ModelError(f"{path}: {error}; {remedy}") from error
+    return description

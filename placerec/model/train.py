@@ -190,6 +190,8 @@ def describe_model(
 def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: Options) -> None:
     if not 1 <= options.order <= MAX_ORDER:
         raise ModelError(f"order {options.order} is not between 1 and {MAX_ORDER}")
+    if not options.min_count or min(options.min_count) < 1:
+        raise ModelError(f"minimum counts {options.min_count} are not understood; give numbers above 0, one at least")
     smoothing(options.smoothing, options.delta)
     if not sentences:
         raise ModelError("no labelled frame found: label the frames (places.lst, or one folder per place) to train")

@@ -69,7 +69,9 @@ def describe(
         raise VisionError(f"none of the {len(named)} images can be read; name a folder with images")
     constant = [str(frame.path) for _, frame, values in kept if not values.any()]
     if constant:
-        log.warning("%d images are of one grey level throughout, the first is %s", len(constant), constant[0])
+        log.warning("%s: of one grey level throughout; its descriptor is zero", constant[0])
+    counts = len(kept), len(named) - len(kept), len(constant)
+    log.info("%d frames described, %d skipped, %d of one grey level throughout", *counts)
     return Descriptors(
         spec,
         np.stack([values for _, _, values in kept]),

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Iterable
 from pathlib import Path
 
+from placerec.files import whole_file
 from placerec.frames import find_sequences
 from placerec.vision.describe import Progress, describe, save_descriptors
 from placerec.vision.dictionary import Dictionary
@@ -24,7 +25,9 @@ def describe_sources(
 
     Raises SourceError for sources and VisionError for images that cannot be used, OutputError for the file.
     """
-    save_descriptors(describe(find_sequences(sources, format=format), spec, progress=progress), out)
+    # The file comes first: that it cannot be written must not be found out after an hour of images.
+    with whole_file(Path(out)) as partial:
+        save_descriptors(describe(find_sequences(sources, format=format), spec, progress=progress), partial)
 
 
 def train_dictionary(
@@ -45,18 +48,24 @@ def train_dictionary(
 
     `progress` is called with frames described and in all. Raises as `describe_sources` and `Dictionary.fit` do.
     """
-    described = describe(find_sequences(sources, format=format), spec, progress=progress)
-    dictionary = Dictionary.fit(
-        described.values,
-        spec=described.spec,
-        size=size,
-        components=components,
-        seed=seed,
-        fraction=fraction,
-        epochs=epochs,
-        units=units,
-    )
-    dictionary.save(out)
+    with whole_file(Path(out)) as partial:
+        described = describe(find_sequences(sources, format=format), spec, progress=progress)
+        dictionary = Dictionary.fit(
+            described.values,
+            spec=described.spec,
+            size=size,
+            components=components,
+            seed=seed,
+            fraction=fraction,
+            epochs=epochs,
+            units=units,
+        )
+        dictionary.save(partial)
+    _report(dictionary)
+    return dictionary
+
+
+def _report(dictionary: Dictionary) -> None:
     quality = dictionary.quality
     log.info(
         "%d words, %d of them never seen, from %d of %d frames; %d components keep %.1f %% of the variance (%d would "
@@ -72,4 +81,3 @@ def train_dictionary(
         quality.topographic_error,
         quality.epochs,
     )
-    return dictionary

@@ -42,6 +42,8 @@ def read_npz(path: Path, names: tuple[str, ...]) -> tuple[Arrays, dict[str, Any]
             meta = json.loads(str(file["meta"]))
     except FileNotFoundError as error:
         raise VisionError("no such file") from error
+    except IsADirectoryError as error:
+        raise VisionError("it is a folder") from error
     except zipfile.BadZipFile as error:
         raise VisionError("it is not an npz file, or it is truncated") from error
     except (OSError, EOFError, ValueError, zlib.error, NotImplementedError, RuntimeError, MemoryError) as error:

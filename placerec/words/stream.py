@@ -60,6 +60,9 @@ def format_seconds(time: float) -> str:
 def write_stream(stream: WordStream, path: Path | str) -> None:
     """Write a token stream file, whole or not at all."""
     lines = ["\t".join(COLUMNS)]
+    for frame in stream.frames:
+        if set(frame) & set("\t\n\r"):
+            raise StreamError(f"{stream.name}: the frame {frame!r} holds a tab or a line end; rename the image")
     for frame, time, place, word, distance in zip(
         stream.frames, stream.times, stream.places, stream.words, stream.distances, strict=True
     ):
@@ -82,6 +85,8 @@ def read_stream(path: Path | str) -> WordStream:
     if "word" not in header:
         if len(header) > 1 or "frame" in header:
             raise StreamError(at(path, 1, f"the header {lines[0]!r} has no column 'word'"))
+        if not any(line.split() for line in lines):
+            raise StreamError(f"{path}: holds no word; a token stream or a text of words is expected")
         return WordStream.of(name, [check_word(path, i, w) for i, line in enumerate(lines, 1) for w in line.split()])
     rows = [(i, line.split("\t")) for i, line in enumerate(lines[1:], start=2) if line]
     for i, fields in rows:
@@ -118,7 +123,9 @@ def _numbers(path: Path, lines: Iterable[int], title: str, texts: Sequence[str])
         try:
             numbers[row] = float(text) if text else np.nan
         except ValueError:
-            raise StreamError(at(path, i, f"{title} {text!r} is not a number")) from None
+            numbers[row] = np.inf
+        if np.isinf(numbers[row]):
+            raise StreamError(at(path, i, f"{title} {text!r} is not a number"))
     return numbers
 
 

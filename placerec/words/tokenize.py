@@ -1,6 +1,7 @@
 """From images to token streams: the word of every frame."""
 
 import json
+import logging
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from placerec.vision import Descriptors, Dictionary, describe
 from placerec.words.stream import WordStream, write_stream, write_vocabulary
 
 OWNED = ("*.tsv", "vocab.txt", "tokens.json")
+log = logging.getLogger(__name__)
 
 
 def tokenize(
@@ -26,7 +28,12 @@ def tokenize(
     `words`: the words.npz to use. tokens.json names its fingerprint, so that models know what they were trained on.
     """
     dictionary = Dictionary.load(Path(words))
-    write_tokens(streams_of(sources, dictionary, format=format, progress=progress), dictionary, Path(out))
+    # The folder comes first: that it cannot be written must not be found out after an hour of images.
+    with whole_folder(Path(out), OWNED) as folder:
+        streams = streams_of(sources, dictionary, format=format, progress=progress)
+        _write(streams, dictionary, folder)
+    seen = len({word for stream in streams for word in stream.words})
+    log.info("%s: %d sequences, %d of %d words seen", out, len(streams), seen, len(dictionary.vocabulary))
 
 
 def streams_of(
@@ -38,7 +45,10 @@ def streams_of(
 ) -> list[WordStream]:
     """The token streams of image sources: each frame's best-matching unit in `dictionary`."""
     sequences = find_sequences(sources, format=format)
-    return tokens_of(describe(sequences, dictionary.spec, progress=progress), dictionary)
+    streams = tokens_of(describe(sequences, dictionary.spec, progress=progress), dictionary)
+    for name in sorted({sequence.name for sequence in sequences} - {stream.name for stream in streams}):
+        log.warning("%s: none of its images can be read; the sequence is left out", name)
+    return streams
 
 
 def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStream]:
@@ -63,8 +73,12 @@ def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStre
 def write_tokens(streams: Iterable[WordStream], dictionary: Dictionary, out: Path) -> None:
     """Write the tokens folder `out`, whole or not at all."""
     with whole_folder(out, OWNED) as folder:
-        for stream in streams:
-            write_stream(stream, folder / f"{stream.name}.tsv")
-        write_vocabulary(dictionary.vocabulary, folder / "vocab.txt")
-        description = {"format": "placerec tokens 1", "version": __version__, "dictionary": dictionary.fingerprint}
-        write_text(folder / "tokens.json", json.dumps(description, indent=2) + "\n")
+        _write(streams, dictionary, folder)
+
+
+def _write(streams: Iterable[WordStream], dictionary: Dictionary, folder: Path) -> None:
+    for stream in streams:
+        write_stream(stream, folder / f"{stream.name}.tsv")
+    write_vocabulary(dictionary.vocabulary, folder / "vocab.txt")
+    description = {"format": "placerec tokens 1", "version": __version__, "dictionary": dictionary.fingerprint}
+    write_text(folder / "tokens.json", json.dumps(description, indent=2) + "\n")

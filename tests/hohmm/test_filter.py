@@ -149,7 +149,7 @@ def test_words_that_no_model_lists_hold_the_belief(caplog: pytest.LogCaptureFixt
     assert found.selected.tolist() == [True, False, True]
     assert np.array_equal(found.belief[[0, 2]], known.belief)
     assert np.array_equal(found.belief[1], found.belief[0])
-    assert "run: 1 words skipped that the models do not list, 'zebra' first" in caplog.text
+    assert "run: words that the models do not list: 1 skipped, 'zebra' first" in caplog.text
     with pytest.raises(ModelError, match="the word 'zebra' is not in the models' vocabulary"):
         recognizer.update("zebra")
 

@@ -19,7 +19,11 @@ KENLM_ONLY = {
     "eos-absent.arpa",
     "many-suffix-bigrams-absent-3-of-4.arpa",
 }
-GOOD = "\\data\\\nngram 1=3\nngram 2=1\n\n\\1-grams:\n-1\t<s>\t-0.3\n-0.5\ta\t-0.2\n-0.7\tb\n\n\\2-grams:\n-0.4\ta b\n\n\\end\\\n"
+GOOD = (
+    "\\data\\\nngram 1=3\nngram 2=1\n\n"
+    "\\1-grams:\n-1\t<s>\t-0.3\n-0.5\ta\t-0.2\n-0.7\tb\n\n"
+    "\\2-grams:\n-0.4\ta b\n\n\\end\\\n"
+)
 
 
 @settings(max_examples=30, deadline=None)

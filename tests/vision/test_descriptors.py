@@ -69,7 +69,7 @@ def test_broken_images_are_skipped_and_constant_ones_counted(tmp_path: Path, cap
     for frame, warning in zip(one.frames[1:3], warnings, strict=False):
         assert warning.startswith(str(frame.path))
         assert warning.endswith("; the frame is skipped")
-    assert warnings[2] == f"1 images are of one grey level throughout, the first is {one.frames[3].path}"
+    assert warnings[2] == f"{one.frames[3].path}: of one grey level throughout; its descriptor is zero"
 
 
 def test_nothing_readable_is_an_error(tmp_path: Path) -> None:

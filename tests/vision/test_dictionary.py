@@ -287,7 +287,7 @@ def test_a_zip_of_something_else_and_other_things_that_are_no_file(tmp_path: Pat
     for place, message in ((path, "the array mean is missing"), (tmp_path / "no.npz", "no such file")):
         with pytest.raises(VisionError, match=message):
             Dictionary.load(place)
-    with pytest.raises(VisionError, match="it cannot be read"):
+    with pytest.raises(VisionError, match="it is a folder"):
         Dictionary.load(tmp_path)
     with pytest.raises(OutputError):
         dictionary.save(path / "words.npz")

@@ -1,0 +1,466 @@
+"""Every command as a user meets it: help, errors by message and exit code, what goes to stdout and what to stderr."""
+
+import json
+import re
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from small import PLACES, run_through, write_images, write_tokens
+
+from placerec.cli import commands
+from placerec.cli.train_lm import SMOOTHING_NAMES
+from placerec.lm import SMOOTHINGS
+from placerec.words import write_stream
+
+NAMES = sorted(commands.commands)
+
+
+def placerec(*args: object, stdin: str | bytes | None = None) -> Result:
+    return CliRunner().invoke(commands, [str(arg) for arg in args], prog_name="placerec", input=stdin)
+
+
+def done(*args: object, stdin: str | bytes | None = None) -> Result:
+    result = placerec(*args, stdin=stdin)
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def fails(message: str, *args: object) -> None:
+    """Exit code 1 and one line on stderr, the last one, that says `message`; nothing on stdout."""
+    result = placerec(*args)
+    assert result.exit_code == 1, result.output
+    assert isinstance(result.exception, SystemExit), result.exception
+    assert result.stdout == ""
+    errors = [line for line in result.stderr.splitlines() if line.startswith("placerec: ")]
+    assert errors == result.stderr.splitlines()[-1:]
+    assert re.search(message, errors[0]), errors[0]
+
+
+def misused(message: str, *args: object) -> None:
+    """Exit code 2, and a message on stderr."""
+    result = placerec(*args)
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    assert message in result.stderr.splitlines()[-1], result.stderr
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two image sequences, a dictionary of the first, tokens, models of words that need no image, and beliefs."""
+    root = tmp_path_factory.mktemp("world")
+    for seed, name in enumerate(("seq1", "seq2")):
+        write_images(root / "runs" / name, seed)
+    size = ("--size", 3, "--image-size", 16, "-q")
+    done("train-words", root / "runs/seq1", "-o", root / "words.npz", *size)
+    done("train-words", root / "runs/seq2", "-o", root / "other.npz", *size)
+    done("tokenize", root / "runs", "-w", root / "words.npz", "-o", root / "seen", "-q")
+    write_tokens(root / "tokens")
+    done("train-lm", root / "tokens/run1.tsv", root / "tokens/run2.tsv", "-o", root / "model", "-q")
+    done("train-lm", root / "seen/seq1.tsv", "-o", root / "seen-model", "-q")
+    done("decode", root / "tokens/run3.tsv", "-m", root / "model", "-o", root / "beliefs", "-q")
+    return root
+
+
+# Help
+
+
+def test_all_commands_of_the_contract_so_far_are_there() -> None:
+    expected = "check decode demo describe evaluate inspect lab tokenize train-lm train-words"
+    assert " ".join(NAMES) == expected
+    assert len(commands.commands) == 10
+
+
+def test_the_list_of_commands_is_not_cut_off() -> None:
+    text = done("--help").stdout
+    assert "..." not in text.partition("Commands:")[2].partition("Your own images")[0]
+    for name in NAMES:
+        assert re.search(rf"^  {name} +[A-Z].*\.$", text, re.MULTILINE), name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_command_helps(name: str) -> None:
+    text = done(name, "--help").stdout
+    assert text == done(name, "-h").stdout
+    assert f"Example: placerec {name}" in text
+    command = commands.commands[name]
+    options = {option for param in command.params for option in param.opts}
+    assert {"-q", "--quiet", "-v", "--verbose"} <= options
+    for param in command.params:
+        if isinstance(param, click.Option):
+            assert param.help, f"{param.opts} is not explained"
+            told = param.show_default or param.required or param.is_flag or "[default: " in param.help
+            assert told or not isinstance(param.default, int | float | str), f"the default of {param.opts} is not shown"
+
+
+def test_options_of_one_name_are_one_option() -> None:
+    """One spelling across commands: short and long forms always go together, and -o is always the output."""
+    forms: dict[str, set[tuple[str, ...]]] = {}
+    for command in commands.commands.values():
+        for param in command.params:
+            if isinstance(param, click.Option):
+                forms.setdefault(param.opts[-1], set()).add(tuple(param.opts))
+    assert {name for name, spellings in forms.items() if len(spellings) > 1} == set()
+    assert forms["--out"] == {("-o", "--out")}
+
+
+def test_the_names_of_smoothings_are_those_of_the_library() -> None:
+    assert tuple(SMOOTHINGS) == SMOOTHING_NAMES
+
+
+def test_the_version_is_told() -> None:
+    assert re.fullmatch(r"placerec, version \d+\.\d+\.\d+\n", done("--version").stdout)
+
+
+# Usage
+
+
+def test_no_command_is_an_error_of_usage() -> None:
+    result = placerec()
+    assert result.exit_code == 2
+    assert "train-words" in result.stderr
+
+
+def test_unknown_commands_and_options_are_errors_of_usage() -> None:
+    misused("No such command 'train'", "train")
+    misused("No such option '--frob'", "decode", "--frob")
+    misused("Missing argument 'SOURCE...'", "train-words")
+    misused("Missing option '-m' / '--model'", "decode", "tokens")
+    misused("Missing option '-o' / '--out'", "train-lm", "tokens")
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "value", "message"),
+    [
+        ("train-lm", "--order", "0", "0 is not in the range 1<=x<=9"),
+        ("train-lm", "--smoothing", "kn", "'kn' is not one of 'witten-bell', 'witten-bell-backoff'"),
+        ("train-lm", "--delta", "0", "0.0 is not in the range x>0"),
+        ("train-lm", "--delta", "nan", "nan is not a number that can be used"),
+        ("train-lm", "--delta", "inf", "inf is not a number that can be used"),
+        ("train-lm", "--select", "some", "Invalid value for '--select': selection 'some' is unknown; give none"),
+        ("train-lm", "--select", "subsample:0", "selection 'subsample:0' is unknown"),
+        ("train-lm", "--min-count", "0", "Invalid value for '--min-count': minimum count '0' is not understood"),
+        ("decode", "--stay", "nan", "nan is not a number that can be used"),
+        ("decode", "--stay", "1.5", "1.5 is not in the range 0<=x<=1"),
+        ("decode", "--scorer", "srilm", "'srilm' is not one of 'native', 'kenlm'"),
+        ("train-words", "--size", "1", "1 is not in the range 2<=x<=200"),
+        ("train-words", "--fraction", "0", "0.0 is not in the range 0<x<=1"),
+        ("train-words", "--fraction", "nan", "nan is not a number that can be used"),
+        ("train-words", "--image-size", "100000", "100000 is not in the range 8<=x<=1024"),
+        ("train-words", "--seed", "-1", "-1 is not in the range x>=0"),
+        ("describe", "--variant", "gist", "'gist' is not one of 'lmgist', 'classic'"),
+        ("tokenize", "--format", "video", "'video' is not one of 'auto', 'sequences', 'places'"),
+        ("lab", "--scale", "big", "'big' is not one of 'tiny', 'small', 'paper'"),
+    ],
+)
+def test_bad_values_are_errors_of_usage(world: Path, command: str, option: str, value: str, message: str) -> None:
+    given: dict[str, list[object]] = {
+        "train-lm": [world / "tokens", "-o", world / "no"],
+        "decode": [world / "tokens/run3.tsv", "-m", world / "model"],
+        "train-words": [world / "runs", "-o", world / "no"],
+        "describe": [world / "runs", "-o", world / "no"],
+        "tokenize": [world / "runs", "-w", world / "words.npz", "-o", world / "no"],
+        "lab": [world / "no"],
+    }
+    misused(message, command, *given[command], option, value)
+    assert not (world / "no").exists()
+
+
+def test_empty_paths_and_dashes_are_refused_where_nothing_is_streamed(world: Path) -> None:
+    misused("Invalid value for '-o' / '--out': the path is empty", "train-lm", world / "tokens", "-o", "")
+    misused("Invalid value for 'SOURCE...': the path is empty", "train-words", "", "-o", world / "no")
+    misused("`-` is no stream here; name a path", "train-words", "-", "-o", world / "no")
+    misused("`-` is no stream here; name a path", "describe", world / "runs", "-o", "-")
+
+
+def test_a_folder_is_no_file_to_write(world: Path) -> None:
+    for command in ("train-words", "describe"):
+        misused("is a directory", command, world / "runs", "-o", world / "tokens")
+
+
+# Images
+
+
+def test_sources_without_images_are_named(world: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file.txt").write_text("")
+    for args in (["train-words"], ["describe"], ["tokenize", "-w", world / "words.npz"]):
+        fails("nowhere: no such folder", *args, tmp_path / "nowhere", "-o", tmp_path / "no")
+        fails(
+            "empty: no sequence there; looked for std_cam/ and images", *args, tmp_path / "empty", "-o", tmp_path / "n"
+        )
+        fails(r"file\.txt: is a file, and a folder is expected", *args, tmp_path / "file.txt", "-o", tmp_path / "no")
+
+
+def test_images_that_cannot_be_read_are_named_and_counted(world: Path, tmp_path: Path) -> None:
+    write_images(tmp_path / "seq")
+    bad = tmp_path / "seq/std_cam/t2000.000000_x0.000000_y0.000000_a0.000000.jpeg"
+    bad.write_text("no picture")
+    result = done("tokenize", tmp_path / "seq", "-w", world / "words.npz", "-o", tmp_path / "tokens")
+    assert f"warning: {bad}: is no image that OpenCV can decode" in result.stderr
+    assert "12 frames described, 1 skipped, 0 of one grey level throughout\n" in result.stderr
+    assert len((tmp_path / "tokens/seq.tsv").read_text().splitlines()) == 13
+    (tmp_path / "bad").mkdir()
+    bad.rename(tmp_path / "bad/a.jpeg")
+    for args in (["train-words"], ["describe"], ["tokenize", "-w", world / "words.npz"]):
+        fails("none of the 1 images can be read; name a folder", *args, tmp_path / "bad", "-o", tmp_path / "no")
+
+
+def test_train_words_tells_the_variance_that_is_kept(world: Path, tmp_path: Path) -> None:
+    args = ("--size", 2, "--image-size", 16, "--components", 3)
+    result = done("train-words", world / "runs", "-o", tmp_path / "w.npz", *args)
+    assert re.search(r"3 components keep \d+\.\d % of the variance", result.stderr)
+    assert result.stdout == ""
+
+
+def test_describe_writes_arrays(world: Path, tmp_path: Path) -> None:
+    done("describe", world / "runs", "-o", tmp_path / "d.npz", "--image-size", 16)
+    with np.load(tmp_path / "d.npz", allow_pickle=False) as arrays:
+        assert arrays["descriptors"].shape == (24, 384)
+        assert arrays["descriptors"].dtype == np.float32
+        assert arrays["sequences"].tolist() == ["seq1"] * 12 + ["seq2"] * 12
+        assert arrays["frames"].shape == (24,)
+
+
+def test_broken_dictionaries_are_named(world: Path, tmp_path: Path) -> None:
+    whole = (world / "words.npz").read_bytes()
+    (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "text.npz").write_text("garbage")
+    for name, message in (
+        ("cut.npz", "it is not an npz file, or it is truncated; make it again with `placerec train-words`"),
+        ("text.npz", "it is not an npz file, or it is truncated; make it again with `placerec train-words`"),
+        ("nothing.npz", "no such file; name another"),
+    ):
+        message = re.escape(f"{name}: {message}")
+        fails(message, "tokenize", world / "runs", "-w", tmp_path / name, "-o", tmp_path / "no")
+        fails(message, "decode", world / "runs/seq1", "-w", tmp_path / name, "-m", world / "seen-model")
+
+
+def test_names_of_sequences_that_stay_equal_are_refused(world: Path, tmp_path: Path) -> None:
+    for name in ("a/run", "b/run", "c/a/run"):
+        write_images(tmp_path / name, frames=2)
+    into = ("-w", world / "words.npz", "-o", tmp_path / "tokens")
+    done("tokenize", tmp_path / "a/run", tmp_path / "b/run", *into)
+    assert {"a-run.tsv", "b-run.tsv"} <= {path.name for path in (tmp_path / "tokens").iterdir()}
+    fails("c/a/run: is named a-run, as .*a/run is; rename one of them", "tokenize", tmp_path / "a/run",
+          tmp_path / "c/a/run", *into)  # fmt: skip
+
+
+# Outputs
+
+
+def test_outputs_that_hold_other_things_are_refused_before_any_work(world: Path, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    foreign = r"holds notes\.txt, which this command does not write; name another folder"
+    tokenize = ("tokenize", world / "runs", "-w", world / "words.npz")
+    for args in (tokenize, ("train-lm", world / "tokens"), ("decode", world / "tokens", "-m", world / "model")):
+        fails(foreign, *args, "-o", tmp_path)
+        fails(r"notes\.txt: is a file, and a folder is to be written", *args, "-o", tmp_path / "notes.txt")
+    assert placerec(*tokenize, "-o", tmp_path).stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_parents_of_an_output_are_made(world: Path, tmp_path: Path) -> None:
+    done("train-lm", world / "tokens", "-o", tmp_path / "a/b/model")
+    assert (tmp_path / "a/b/model/model.json").exists()
+
+
+def test_an_output_is_replaced_whole(world: Path, tmp_path: Path) -> None:
+    done("decode", world / "tokens", "-m", world / "model", "-o", tmp_path / "out")
+    done("decode", world / "tokens/run1.tsv", "-m", world / "model", "-o", tmp_path / "out")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["run1.tsv"]
+
+
+# Models
+
+
+def test_training_refuses_words_and_vocabularies_it_cannot_use(world: Path, tmp_path: Path) -> None:
+    write_tokens(tmp_path, ["run"])
+    path = tmp_path / "run.tsv"
+    path.write_text(path.read_text().replace("w04", "w99", 1))
+    line = 1 + next(i for i, text in enumerate(path.read_text().splitlines()) if "w99" in text)
+    fails(rf"run\.tsv:{line}: the word 'w99' is not in the vocabulary", "train-lm", path, "-o", tmp_path / "model")
+    fails(r"none\.txt: no such file", "train-lm", path, "-o", tmp_path / "model", "--vocab", tmp_path / "none.txt")
+    (tmp_path / "vocab.txt").unlink()
+    fails(r"vocab\.txt: no such file; the vocabulary .* is named with --vocab FILE", "train-lm", path, "-o", tmp_path)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.tsv"]
+    result = done("decode", path, "-m", world / "model")
+    assert "warning: run: words that the models do not list: 1 skipped, 'w99' first\n" in result.stderr
+
+
+def test_training_options_reach_the_model(world: Path, tmp_path: Path) -> None:
+    done(
+        "train-lm", world / "tokens", "-o", tmp_path / "model", "--order", 3, "--smoothing", "lidstone",
+        "--delta", 0.25, "--select", "compress:2", "--min-count", "1,2", "--markers",
+    )  # fmt: skip
+    described = json.loads((tmp_path / "model/model.json").read_text())
+    found = {name: described[name] for name in ("order", "smoothing", "delta", "select", "min_count", "markers")}
+    assert found == {
+        "order": 3,
+        "smoothing": "lidstone",
+        "delta": 0.25,
+        "select": "compress:2",
+        "min_count": [1, 2],
+        "markers": True,
+    }
+
+
+def test_check_and_inspect_name_what_they_cannot_read(world: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty.arpa").write_text("")
+    for command in ("check", "inspect"):
+        fails(r"none\.arpa: no such file", command, tmp_path / "none.arpa")
+        fails(r"empty\.arpa:1: the file ends where", command, tmp_path / "empty.arpa")
+        fails("model: is a folder, and a file is expected", command, world / "model")
+    fails("the word 'zz' is not in the model", "inspect", world / "model/hall.arpa", "w01 zz")
+
+
+def test_check_is_content_with_our_models_and_not_with_others(world: Path, tmp_path: Path) -> None:
+    pytest.importorskip("kenlm")
+    models = sorted((world / "model").glob("*.arpa"))
+    assert [path.stem for path in models] == list(PLACES)
+    assert [line.endswith(": ok") for line in done("check", *models).stdout.splitlines()] == [True] * 3
+    assert [one["ok"] for one in json.loads(done("check", *models, "--json").stdout)] == [True] * 3
+    bad = tmp_path / "bad.arpa"
+    bad.write_text(re.sub(r"^-\S+(?=\tw03)", "-0.1", models[0].read_text(), count=1, flags=re.MULTILINE))
+    result = placerec("check", bad)
+    assert result.exit_code == 1
+    assert "FAIL (worst context" in result.stdout
+    assert result.stderr == "placerec: a model is not as it should be; see above\n"
+
+
+def test_inspect_shows_ngrams(world: Path) -> None:
+    text = done("inspect", world / "model/hall.arpa", "w01 w02", "--top", 1).stdout
+    assert "order 2" in text
+    assert "w01 w02" in text
+    assert json.loads(done("inspect", world / "model/hall.arpa", "w01 w02", "--json").stdout)
+
+
+# Decoding
+
+
+def test_decode_refuses_what_does_not_fit(world: Path, tmp_path: Path) -> None:
+    images, model = world / "runs/seq2", ("-m", world / "seen-model")
+    fails(
+        "seen-model: was trained on the words of another dictionary",
+        "decode",
+        images,
+        *model,
+        "-w",
+        world / "other.npz",
+    )
+    fails("2 sequences to decode: name a folder for their beliefs with -o", "decode", world / "seen", *model)
+    fails("seq2: holds no token stream", "decode", images, *model)
+    tokens = world / "seen/seq2.tsv"
+    fails("is a token stream, which needs no dictionary", "decode", tokens, *model, "-w", world / "words.npz")
+    fails("nowhere: no such model folder; `placerec train-lm", "decode", tokens, "-m", tmp_path / "nowhere")
+    fails("nowhere: no such file or folder", "decode", tmp_path / "nowhere", *model)
+    done("tokenize", images, "-w", world / "other.npz", "-o", tmp_path / "tokens")
+    fails("tokens: its words are of another dictionary", "decode", tmp_path / "tokens", *model)
+
+
+def test_decode_to_stdout_and_to_a_file_are_the_same(world: Path) -> None:
+    shown = done("decode", world / "tokens/run3.tsv", "-m", world / "model")
+    assert shown.stdout == (world / "beliefs/run3.tsv").read_text()
+    assert shown.stderr == ""
+
+
+def test_decode_of_images_is_decode_of_their_words(world: Path) -> None:
+    model = ("-m", world / "seen-model", "-q")
+    images = done("decode", world / "runs/seq2", *model, "-w", world / "words.npz").stdout
+    assert images == done("decode", world / "seen/seq2.tsv", *model).stdout
+    assert len(images.splitlines()) == 13
+
+
+def test_decode_streams(world: Path) -> None:
+    model = ("-m", world / "model")
+    answered = done("decode", "-", *model, stdin="w01\t1.5\nzz\n\nw02\r\n")
+    rows = [line.split("\t") for line in answered.stdout.splitlines()]
+    assert [row[:5] for row in rows[1:]] == [
+        ["0", "1.5", "", "w01", "1"],
+        ["1", "", "", "zz", "0"],
+        ["2", "", "", "", "0"],
+        ["3", "", "", "w02", "1"],
+    ]
+    assert answered.stderr.splitlines() == [
+        "warning: <stdin>:2: the word 'zz' is not in the models' vocabulary; skipped",
+        "warning: <stdin>: lines skipped because the models do not list their word: 2",
+    ]
+    assert done("decode", "-", *model, stdin="").stdout.count("\n") == 1
+    misused("it takes neither -w nor -o", "decode", "-", *model, "-o", world / "no")
+    misused("it takes neither -w nor -o", "decode", "-", *model, "-w", world / "words.npz")
+    misused("`-` cannot be mixed with files", "decode", "-", world / "tokens", *model)
+
+
+def test_bad_seconds_end_a_stream_with_an_error(world: Path) -> None:
+    result = placerec("decode", "-", "-m", world / "model", stdin="w01\t1\nw01\tsoon\n")
+    assert result.exit_code == 1
+    assert len(result.stdout.splitlines()) == 2
+    assert result.stderr == "placerec: <stdin>:2: time 'soon' is not a number of seconds\n"
+
+
+# Evaluation
+
+
+def test_evaluate_names_what_it_cannot_judge(world: Path, tmp_path: Path) -> None:
+    (tmp_path / "words.txt").write_text("w01 w02")
+    done("decode", tmp_path / "words.txt", "-m", world / "model", "-o", tmp_path / "beliefs")
+    fails("no frame of words has a label", "evaluate", tmp_path / "beliefs/words.tsv")
+    fails(r"run3\.tsv:1: not a beliefs file: no column selected, best", "evaluate", world / "tokens/run3.tsv")
+    fails(r"none\.tsv: no such file", "evaluate", tmp_path / "none.tsv")
+    plot = ("--plot", tmp_path / "picture.xyz")
+    fails(r"picture\.xyz: no kind of picture; let its name end", "evaluate", world / "beliefs", *plot)
+
+
+def test_evaluate_reads_a_pipe(world: Path) -> None:
+    text = (world / "beliefs/run3.tsv").read_text()
+    piped = json.loads(done("evaluate", "-", "--json", stdin=text).stdout)
+    named = json.loads(done("evaluate", world / "beliefs", "--json").stdout)
+    assert piped.pop("sequences").keys() == {"stdin"}
+    assert named.pop("sequences").keys() == {"run3"}
+    assert piped == named
+    assert piped["frames"] == 60
+
+
+# Talk
+
+
+def test_json_holds_no_nan(world: Path, tmp_path: Path) -> None:
+    """JSON has no NaN: other languages' parsers stop there. An unstamped run has times that are not known."""
+    write_stream(run_through("run", 5), tmp_path / "run.tsv")
+    (tmp_path / "run.txt").write_text(" ".join(run_through("run", 5).words))
+    for args in (
+        ("decode", tmp_path / "run.txt", "-m", world / "model", "--json"),
+        ("evaluate", world / "beliefs", "--json"),
+        ("inspect", world / "model/hall.arpa", "w01 w02", "--json"),
+    ):
+        text = done(*args).stdout
+        for part in text.splitlines() if args[0] == "decode" else [text]:
+            json.loads(part, parse_constant=pytest.fail)
+
+
+def test_quiet_is_silent_and_other_commands_tell_what_they_did(world: Path, tmp_path: Path) -> None:
+    small = ("--size", 2, "--image-size", 16)
+    for i, args in enumerate(
+        (
+            ("train-words", world / "runs", *small),
+            ("tokenize", world / "runs", "-w", world / "words.npz"),
+            ("train-lm", world / "tokens"),
+            ("decode", world / "tokens", "-m", world / "model"),
+        )
+    ):
+        told, quiet = (done(*args, "-o", tmp_path / f"{i}{q}", *q.split()) for q in ("", "-q"))
+        assert quiet.output == "", args
+        assert told.stdout == ""
+        assert told.stderr.count("\n") >= 1, args
+
+
+def test_there_is_no_progress_bar_without_a_terminal(world: Path, tmp_path: Path) -> None:
+    result = done("tokenize", world / "runs", "-w", world / "words.npz", "-o", tmp_path / "tokens")
+    assert result.stderr == (
+        f"24 frames described, 0 skipped, 0 of one grey level throughout\n{tmp_path / 'tokens'}: 2 sequences, "
+        + result.stderr.rpartition("2 sequences, ")[2]
+    )
+    assert "\r" not in result.stderr
+    assert "%" not in result.stderr

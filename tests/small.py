@@ -1,0 +1,54 @@
+"""A small world for tests: three places, twelve words, two runs; and image sequences of noise that has structure."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from placerec.words import WordStream, write_stream, write_vocabulary
+
+PLACES = ("hall", "kitchen", "office")
+VOCABULARY = tuple(f"w{i:02d}" for i in range(12))
+
+
+def run_through(name: str, seed: int, frames: int = 60) -> WordStream:
+    """A run with two visits to each place; a place has five words of its own, in runs, and a few strays."""
+    rng = np.random.default_rng(seed)
+    places = [PLACES[i * 6 // frames % 3] for i in range(frames)]
+    words: list[str] = []
+    for place in places:
+        own = PLACES.index(place) * 3 + rng.integers(5)
+        stray = rng.integers(len(VOCABULARY))
+        again = words and rng.random() < 0.4
+        words.append(words[-1] if again else VOCABULARY[stray if rng.random() < 0.1 else own])
+    bare = WordStream.of(name, words, places)
+    return WordStream(
+        name, bare.frames, np.arange(frames, dtype=np.float64) / 2, bare.places, bare.words, bare.distances
+    )
+
+
+def write_tokens(folder: Path, names: Sequence[str] = ("run1", "run2", "run3")) -> Path:
+    """A folder as `placerec tokenize` writes it, without tokens.json."""
+    for seed, name in enumerate(names):
+        write_stream(run_through(name, seed), folder / f"{name}.tsv")
+    write_vocabulary(VOCABULARY, folder / "vocab.txt")
+    return folder
+
+
+def write_images(folder: Path, seed: int = 0, frames: int = 12) -> Path:
+    """A sequence of COLD's layout: two places, gratings of another angle in each."""
+    rng = np.random.default_rng(seed)
+    (folder / "std_cam").mkdir(parents=True)
+    (folder / "localization").mkdir()
+    y, x = np.mgrid[:24, :32]
+    labels = []
+    for i in range(frames):
+        place = "hall" if i < frames // 2 else "kitchen"
+        wave = np.sin((x if place == "hall" else y) * (0.5 + rng.random()))
+        name = f"t{1000 + i}.000000_x0.000000_y0.000000_a0.000000.png"
+        picture = (127 + 90 * wave + rng.normal(0, 8, wave.shape)).clip(0, 255).astype(np.uint8)
+        assert cv2.imwrite(str(folder / "std_cam" / name), picture)
+        labels.append(f"{name} {place}\n")
+    (folder / "localization" / "places.lst").write_text("".join(labels), encoding="utf-8")
+    return folder

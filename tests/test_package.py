@@ -1,0 +1,112 @@
+"""The package as a whole: what importing it costs, what it exports, and which room may know which."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import placerec
+
+PACKAGE = Path(placerec.__file__).parent
+HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm")
+# A room imports only from rooms to its left, and these anyone may import.
+LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "evaluation", "demo", "cli")
+COMMON = {"errors", "files", "version"}
+ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
+    # A toolkit for text alone.
+    "lm": COMMON | {"lm"},
+    "lab": COMMON | {"lab"},
+    "demo": COMMON | set(LINE[:-1]) | {"lab"},
+    "cli": COMMON | set(LINE) | {"lab"},
+    "files": {"errors"},
+    "errors": set(),
+    "version": set(),
+    "reference": set(),
+}
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports(path: Path) -> list[tuple[int, str]]:
+    """Line and full name of every module that a file imports, inside functions and for types too."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found += [(node.lineno, alias.name) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: relative import"
+            module = node.module or ""
+            names = [alias.name for alias in node.names] if module == "placerec" else [""]
+            found += [(node.lineno, f"{module}.{name}".rstrip(".")) for name in names]
+    return found
+
+
+def loaded_by(statement: str) -> set[str]:
+    code = f"import sys; {statement}; print(' '.join(m for m in {HEAVY!r} if m in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_there_are_files_to_look_at() -> None:
+    assert len(FILES) > 40
+    assert {room_of(path) for path in FILES} - {"__init__", "__main__"} <= set(ALLOWED)
+
+
+@pytest.mark.parametrize("statement", ["import placerec", "import placerec.cli", "import placerec.errors"])
+def test_importing_is_cheap(statement: str) -> None:
+    assert loaded_by(statement) == set()
+
+
+def test_help_loads_nothing_heavy() -> None:
+    run = "from placerec.cli import commands; commands.main(['train-lm', '--help'], standalone_mode=False)"
+    code = f"import sys; {run}; sys.exit(' '.join(m for m in {HEAVY!r} if m in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr.strip()) in ((0, ""), (1, "")), done.stderr
+
+
+def test_words_are_decoded_without_images_libraries() -> None:
+    """A robot that gets words from elsewhere needs neither OpenCV nor scipy in memory."""
+    assert loaded_by("import placerec; placerec.load_recognizer, placerec.read_stream") == {"numpy"}
+
+
+def test_every_public_name_resolves() -> None:
+    assert placerec.__all__ == sorted(placerec.__all__)
+    for name in placerec.__all__:
+        assert getattr(placerec, name) is not None
+    assert set(placerec._HOME) | {"__version__"} == set(placerec.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        placerec.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_rooms_know_only_rooms_to_their_left(path: Path) -> None:
+    room = room_of(path)
+    if room in ("__init__", "__main__"):
+        return
+    for line, module in imports(path):
+        if module.split(".")[0] == "placerec":
+            other = [*module.split("."), ""][1]
+            assert other in ALLOWED[room], f"{path}:{line}: {room} imports {module}"
+        assert module.split(".")[0] != "click" or room == "cli", f"{path}:{line}: only cli/ knows click"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_the_library_neither_prints_nor_exits(path: Path) -> None:
+    if room_of(path) == "cli":
+        return
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            assert called not in ("print", "sys.exit", "exit", "quit", "input", "os._exit"), f"{path}:{node.lineno}"
+            assert not called.startswith(("sys.stdout.", "sys.stderr.")), f"{path}:{node.lineno}: {called}"
+
+
+def test_the_rules_would_be_seen_to_be_broken(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.py"
+    broken.write_text("def f():\n    from placerec.words import x\n    from placerec import lm\n    import click\n")
+    assert imports(broken) == [(2, "placerec.words"), (3, "placerec.lm"), (4, "click")]
