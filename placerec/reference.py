@@ -35,13 +35,17 @@ def smoothed(counts: Mapping[Ngram, int], vocabulary: Sequence[str], order: int,
     weight: dict[Ngram, float] = {}
     for h in sorted(after, key=len):
         N, T = sum(after[h].values()), len(after[h])
-        spread = T if name.startswith("witten-bell") else delta * V
         lower = {word: backed_off((p, weight), word, h[1:]) if h else 1 / V for word in after[h]}
+        # What the shorter context's words share, the whole that all is a part of, and what is taken off each count.
+        shared, whole, off = {
+            "witten-bell": (T, N + T, 0.0),
+            "lidstone": (delta * V, N + delta * V, -delta),
+            "absolute": (delta * T, N, delta),
+        }[name.removesuffix("-backoff")]
         if name.endswith("-backoff"):
-            added = delta if name == "lidstone-backoff" else 0
-            seen = {word: (c + added) / (N + spread) for word, c in after[h].items()}
+            seen = {word: (c - off) / whole for word, c in after[h].items()}
         else:
-            seen = {word: (c + spread * lower[word]) / (N + spread) for word, c in after[h].items()}
+            seen = {word: (c - max(off, 0) + shared * lower[word]) / whole for word, c in after[h].items()}
         left = 1 - sum(seen.values())
         left_below = 1 - sum(lower.values())
         if not h:

@@ -18,8 +18,10 @@ ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     # A toolkit for text alone.
     "lm": COMMON | {"lm"},
     "lab": COMMON | {"lab"},
+    # SRILM's surface hangs off the language models alone.
+    "srilm": COMMON | {"lm", "srilm"},
     "demo": COMMON | set(LINE[:-1]) | {"lab"},
-    "cli": COMMON | set(LINE) | {"lab"},
+    "cli": COMMON | set(LINE) | {"lab", "srilm"},
     "files": {"errors"},
     "errors": set(),
     "version": set(),
@@ -97,7 +99,8 @@ def test_rooms_know_only_rooms_to_their_left(path: Path) -> None:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_the_library_neither_prints_nor_exits(path: Path) -> None:
-    if room_of(path) == "cli":
+    # srilm/run.py is where the process begins and ends for the tools in bin/.
+    if room_of(path) == "cli" or path == PACKAGE / "srilm/run.py":
         return
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call):

@@ -14,6 +14,7 @@ from placerec.cli.describe import describe
 from placerec.cli.evaluate import evaluate
 from placerec.cli.inspect import inspect
 from placerec.cli.lab import lab
+from placerec.cli.srilm import SRILM_COMMANDS
 from placerec.cli.tokenize import tokenize
 from placerec.cli.train_lm import train_lm
 from placerec.cli.train_words import train_words
@@ -69,6 +70,8 @@ def commands() -> None:
 
 for command in (describe, train_words, tokenize, train_lm, decode, evaluate, inspect, check, lab, demo):
     commands.add_command(command)
+for tool in SRILM_COMMANDS:
+    commands.add_command(tool)
 
 
 def main() -> None:

@@ -7,7 +7,11 @@ import click
 from placerec.cli.options import PATH, FiniteRange, output_option, progress_bar, talk_options, usage
 
 # The names of placerec.lm.SMOOTHINGS, written out: importing it would make --help wait for numpy.
-SMOOTHING_NAMES = ("witten-bell", "witten-bell-backoff", "lidstone", "lidstone-backoff")
+SMOOTHING_NAMES = tuple(
+    name + suffix
+    for name in ("witten-bell", "lidstone", "absolute", "kneser-ney", "modified-kneser-ney")
+    for suffix in ("", "-backoff")
+)
 
 
 @click.command("train-lm", epilog="Example: placerec train-lm tokens/seq*[12].tsv -o model/ --order 2")
@@ -25,9 +29,8 @@ SMOOTHING_NAMES = ("witten-bell", "witten-bell-backoff", "lidstone", "lidstone-b
 @click.option(
     "--delta",
     type=FiniteRange(0, min_open=True),
-    default=1.0,
-    show_default=True,
-    help="What lidstone adds to every count.",
+    default=None,
+    help="What lidstone adds to every count  [default: 1], or absolute takes off it  [default: 0.5].",
 )
 @click.option(
     "--select",
@@ -59,7 +62,7 @@ def train_lm(
     tokens: tuple[Path, ...],
     order: int,
     smoothing: str,
-    delta: float,
+    delta: float | None,
     select: str,
     min_count: str,
     markers: bool,

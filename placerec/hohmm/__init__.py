@@ -1,6 +1,6 @@
 """Words and language models -> belief over places: the Bayesian filter of eq. 1."""
 
-from placerec.hohmm.beliefs import Beliefs, format_header, format_row, read_beliefs, write_beliefs
+from placerec.hohmm.beliefs import Beliefs, belief_rows, format_header, format_row, read_beliefs, write_beliefs
 from placerec.hohmm.filter import Filtered, filter_stream
 from placerec.hohmm.recognizer import Belief, Recognizer
 from placerec.hohmm.transitions import Transition, fixed_transition
@@ -11,6 +11,7 @@ __all__ = [
     "Filtered",
     "Recognizer",
     "Transition",
+    "belief_rows",
     "filter_stream",
     "fixed_transition",
     "format_header",

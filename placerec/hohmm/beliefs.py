@@ -7,7 +7,7 @@ place with its belief. The places' columns sum to 1; a last column `unknown` sta
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -60,7 +60,13 @@ def format_row(
 
 def write_beliefs(path: Path | str, beliefs: Beliefs) -> None:
     """Write one sequence's beliefs, gzipped if `path` ends in .gz; raises OutputError if that cannot be done."""
-    rows = zip(
+    lines = [format_header(beliefs.places), *(format_row(*row) for row in belief_rows(beliefs))]
+    write_text(Path(path), "\n".join(lines) + "\n")
+
+
+def belief_rows(beliefs: Beliefs) -> Iterator[tuple[str, float, str, str, bool, str, list[float]]]:
+    """What `format_row` takes, frame by frame."""
+    return zip(
         beliefs.frames,
         beliefs.times.tolist(),
         beliefs.truth,
@@ -70,8 +76,6 @@ def write_beliefs(path: Path | str, beliefs: Beliefs) -> None:
         beliefs.belief.tolist(),
         strict=True,
     )
-    lines = [format_header(beliefs.places), *(format_row(*row) for row in rows)]
-    write_text(Path(path), "\n".join(lines) + "\n")
 
 
 def read_beliefs(path: Path | str) -> Beliefs:

@@ -3,8 +3,8 @@
 from placerec.lm.arpa import format_arpa, read_arpa, with_unigrams, write_arpa
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import NgramCounts, count_ngrams, format_counts
-from placerec.lm.discounts import SMOOTHINGS, Smoothing, smoothing
 from placerec.lm.estimate import estimate
+from placerec.lm.smoothings import SMOOTHINGS, Smoothing, smoothing
 
 __all__ = [
     "SMOOTHINGS",

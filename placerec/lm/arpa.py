@@ -10,43 +10,67 @@ KenLM's, so that a file that passes here passes there; orders that KenLM does no
 log 0.
 """
 
+import logging
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text, write_text
+from placerec.lm.arpa_text import LOG_ZERO, first_lines
 from placerec.lm.backoff import BackoffModel, Singles, score_ids
 from placerec.lm.trie import Ints, Trie, Vocabulary
 
-LOG_ZERO = -99.0
+log = logging.getLogger(__name__)
 
 
 def format_arpa(model: BackoffModel, comment: str = "") -> str:
     """The ARPA text of `model`, with a first line `# comment` if one is given."""
-    lines = [f"# {comment}\n"] if comment else []
-    lines.append("\n\\data\\\n")
-    lines += [f"ngram {n}={len(keys)}\n" for n, keys in enumerate(model.trie.keys, start=1)]
-    contexts = np.zeros(1, np.int64)
-    for n, ranks in enumerate(model.trie.context_ranks(), start=1):
-        lines.append(f"\n\\{n}-grams:\n")
-        prefix = model.trie.prefix(n) if n > 1 else np.zeros(len(model.words), np.int64)
-        by_context = np.lexsort((model.trie.word(n), contexts[prefix]))
-        lines += _section(model, n, by_context)
-        contexts = ranks
-    lines.append("\n\\end\\\n")
-    return "".join(lines)
+    return b"".join(arpa_blocks(model, comment)).decode()
 
 
-def _section(model: BackoffModel, n: int, rows: Ints) -> Iterator[str]:
-    log10_p = np.nan_to_num(model.log10_ps[n - 1].astype(np.float64), neginf=LOG_ZERO)
-    backoff = np.nan_to_num(model.backoffs[n - 1].astype(np.float64), nan=np.inf, neginf=LOG_ZERO, posinf=np.inf)
-    texts = model.trie.texts(n)
-    for row, p, weight in zip(rows.tolist(), log10_p[rows].tolist(), backoff[rows].tolist(), strict=True):
-        yield f"{p:.7g}\t{texts[row]}\n" if weight == np.inf else f"{p:.7g}\t{texts[row]}\t{weight:.7g}\n"
+def arpa_blocks(model: BackoffModel, comment: str = "", *, encoding: str = "utf-8") -> Iterator[bytes]:
+    """The same text in blocks of encoded lines, so that it need not be held whole."""
+    start = f"# {comment}\n\n\\data\\\n" if comment else "\n\\data\\\n"
+    sizes = (f"ngram {n}={len(keys)}\n" for n, keys in enumerate(model.trie.keys, start=1))
+    yield (start + "".join(sizes)).encode(encoding)
+    lines = first_lines(model.words, encoding)
+    rank = np.zeros(1, np.int64)
+    for n in range(1, model.order + 1):
+        yield f"\n\\{n}-grams:".encode()
+        word = model.trie.word(n)
+        # SRILM sorts by the context, read from its last word to its first, then by the word.
+        rows, before = _regrouped(model.trie.prefix(n), rank) if n > 1 else (word, np.zeros_like(word))
+        word = word[rows]
+        log10_p, backoff = model.log10_ps[n - 1][rows], model.backoffs[n - 1][rows]
+        yield from lines.blocks(log10_p, backoff, before, word)
+        if n < model.order:
+            by_word = np.argsort(_narrow(word, len(model.words)), kind="stable")
+            lines = lines.longer(before[by_word], word[by_word])
+            rank = np.empty(len(rows), np.int64)
+            rank[rows[by_word]] = np.arange(len(rows))
+        yield b"\n"
+    yield b"\n\\end\\\n"
+
+
+def _regrouped(prefix: Ints, rank: Ints) -> tuple[Ints, Ints]:
+    """The rows (m,) of ascending prefix rows (m,) so that the prefixes' ranks (p,) ascend, and those ranks (m,)."""
+    sizes = np.bincount(prefix, minlength=len(rank))
+    starts = np.cumsum(sizes) - sizes
+    moved, start = np.empty_like(sizes), np.empty_like(starts)
+    moved[rank], start[rank] = sizes, starts
+    shift = start - (np.cumsum(moved) - moved)
+    before = np.repeat(np.arange(len(rank)), moved)
+    return np.arange(len(prefix)) + shift[before], before
+
+
+def _narrow(word: Ints, size: int) -> NDArray[np.integer]:
+    """Numbers below `size` in a type that numpy sorts fast."""
+    return word.astype(np.uint16) if size <= 1 << 16 else word
 
 
 def write_arpa(model: BackoffModel, path: Path | str, *, comment: str = "") -> None:
@@ -112,6 +136,9 @@ class _Reader:
             else:
                 model, key = self.keys(model, words, first)
             model = _with_order(model, key, log10_p, backoff)
+            if len(model.trie.keys[-1]) < size:
+                twice = size - len(model.trie.keys[-1])
+                log.warning("%s: %d of the %d-grams are listed twice; the first of each counts", self.path, twice, n)
         self.end()
         return model
 

@@ -1,70 +1,107 @@
 """Discounting: how much of a seen n-gram's relative frequency is kept, and what the shorter context gets.
 
-Every rule is a function of `count` (m,), and of `total` and `types` (m,) of the n-gram's context (occurrences, and
-distinct words after it), and of V, the vocabulary's size; it returns (`factor`, `lower`), float64 (m,): with
-interpolation p(w|h) = factor c/T + lower p(w|h'), as a back-off model p(w|h) = factor c/T for seen n-grams and the
-mass left goes to the shorter context. Sources: section 5.1 of our SRILM specification; `paper/readings.md` 1.2.
+Every rule is a function of the n-grams' counts (m,), of their contexts (`Context`, arrays (m,)) and of V, the size of
+the vocabulary; it returns (`factor`, `lower`), float64 (m,): with interpolation p(w|h) = factor c/T + lower p(w|h'),
+as a back-off model p(w|h) = factor c/T for seen n-grams, and the mass left goes to the shorter context. Sources:
+section 5 of our SRILM specification; `lidstone` is formula (c) of the readings of the paper, section 1.2.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import LanguageModelError
-
 Floats = NDArray[np.float64]
-Discount = Callable[[Floats, Floats, Floats, int], tuple[Floats, Floats]]
 
 
-def witten_bell(count: Floats, total: Floats, types: Floats, V: int) -> tuple[Floats, Floats]:
+@dataclass(frozen=True)
+class Context:
+    """What is known of n-grams' contexts, float64 (m,): occurrences, and distinct words, all, twice or thrice seen."""
+
+    total: Floats
+    types: Floats
+    types2: Floats
+    types3: Floats
+
+
+Discount = Callable[[Floats, Context, int], tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How an order is estimated: without `discount` by relative frequency; n-grams seen less than `minimum` are out.
+
+    `exhaustible`: whether a context that leaves nothing to unseen words is done again (section 6.4).
+    """
+
+    discount: Discount | None = None
+    interpolate: bool = False
+    minimum: float = 1
+    exhaustible: bool = True
+
+
+def witten_bell(count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
     """Witten & Bell 1991, method C: a context yields a new word as often as it did so far."""
-    return total / (total + types), types / (total + types)
+    total, types = context.total, context.types
+    whole = np.ceil(total)
+    return total / (total + types), types / (whole + types)
 
 
 def additive(delta: float) -> Discount:
     """SRILM's -addsmooth: (c + delta) / (T + V delta) for seen n-grams; the lower order is reached by back-off only."""
+    return partial(_additive, max(0.0, delta))
 
-    def discount(count: Floats, total: Floats, types: Floats, V: int) -> tuple[Floats, Floats]:
-        return (1 + delta / count) / (1 + V * delta / total), np.zeros_like(count)
 
-    return discount
+def _additive(delta: float, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+    return (1 + delta / count) / (1 + V * delta / context.total), np.zeros_like(count)
 
 
 def lidstone(delta: float) -> Discount:
     """Interpolated Lidstone: V delta imagined occurrences after each context, spread as the shorter context says."""
-
-    def discount(count: Floats, total: Floats, types: Floats, V: int) -> tuple[Floats, Floats]:
-        mass = V * delta
-        return total / (total + mass), mass / (total + mass)
-
-    return discount
+    return partial(_lidstone, delta)
 
 
-@dataclass(frozen=True)
-class Smoothing:
-    """A discount, used for interpolation or for back-off."""
-
-    discount: Discount
-    interpolate: bool
+def _lidstone(delta: float, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+    mass = V * delta
+    return context.total / (context.total + mass), mass / (context.total + mass)
 
 
-SMOOTHINGS: dict[str, Callable[[float], Smoothing]] = {
-    "witten-bell": lambda delta: Smoothing(witten_bell, True),
-    "witten-bell-backoff": lambda delta: Smoothing(witten_bell, False),
-    "lidstone": lambda delta: Smoothing(lidstone(delta), True),
-    "lidstone-backoff": lambda delta: Smoothing(additive(delta), False),
-}
+def absolute(discount: float) -> Discount:
+    """Ney's absolute discounting: a constant, cut to 0..1, is taken off every count."""
+    return partial(_absolute, min(1.0, max(0.0, discount)))
 
 
-def smoothing(name: str, delta: float = 1.0) -> Smoothing:
-    """The smoothing of that name (SMOOTHINGS lists them); `delta` > 0 is used by the lidstone ones.
+def _absolute(discount: float, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+    factor = np.where(count < discount, 0.0, (count - discount) / count)
+    return factor, discount * context.types / np.ceil(context.total)
 
-    Raises LanguageModelError for an unknown name or a delta that leaves unseen words without probability.
-    """
-    if name not in SMOOTHINGS:
-        raise LanguageModelError(f"smoothing {name!r} is unknown; choose one of {', '.join(SMOOTHINGS)}")
-    if not 0 < delta < float("inf"):
-        raise LanguageModelError(f"delta {delta:g} must be a number above 0: it is what unseen words live on")
-    return SMOOTHINGS[name](delta)
+
+def natural(count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+    """Ristad's natural discounting."""
+    total, types = context.total, context.types
+    kept = (total * (total + 1) + types * (1 - types)) / (total * (total + 1) + 2 * types)
+    return np.where(types == V, 1.0, kept), np.zeros_like(count)
+
+
+def good_turing(factors: Sequence[float]) -> Discount:
+    """Good-Turing: `factors[c]` for counts c below len(factors), 1 above."""
+    return partial(_good_turing, np.array([*factors, 1.0]))
+
+
+def _good_turing(factors: Floats, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+    return factors[np.minimum(count, len(factors) - 1).astype(np.int64)], np.zeros_like(count)
+
+
+def modified_kneser_ney(d1: float, d2: float, d3: float) -> Discount:
+    """Chen & Goodman 1998: a discount each for counts of 1, 2, and 3 or more (of left neighbours, at lower orders)."""
+    return partial(_modified_kneser_ney, d1, d2, d3)
+
+
+def _modified_kneser_ney(
+    d1: float, d2: float, d3: float, count: Floats, context: Context, V: int
+) -> tuple[Floats, Floats]:
+    discount = np.select([count == 1, count == 2], [d1, d2], d3)
+    types, twos, threes = context.types, context.types2, context.types3
+    return (count - discount) / count, (d1 * (types - twos) + d2 * (twos - threes) + d3 * threes) / context.total

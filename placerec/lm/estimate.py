@@ -1,70 +1,18 @@
-"""From counts to a back-off model, with SRILM's arithmetic: section 6 of our SRILM specification.
+"""From counts to a back-off model, with SRILM's arithmetic: section 6 of our SRILM specification."""
 
-Log probabilities and weights are stored in float32 and computed in float64 from what is stored: the roundings, and
-the order of the operations, are what makes the printed digits equal.
-"""
-
-import logging
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec.errors import LanguageModelError
 from placerec.lm.backoff import BackoffModel, Singles
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN, NgramCounts
-from placerec.lm.discounts import Floats, Smoothing
-from placerec.lm.trie import Ints, Trie, per_context
-
-EPSILON = 3e-6
-LN10 = 2.30258509299404568402
-Mask = NDArray[np.bool_]
-log = logging.getLogger(__name__)
-
-
-@dataclass
-class _Draft:
-    """The model while it grows; every array lies beside the rows of the counts' trie.
-
-    `stored`: has a log probability of its own. `base` + `weight` (float32): the log probability by back-off, `base` of
-    the longest stored ending and `weight` the backoff weights paid on the way, summed from short contexts to long.
-    `node`: is a context of the model; `backoff` its weight.
-    """
-
-    trie: Trie
-    event: Mask
-    stored: list[Mask] = field(default_factory=list)
-    log10_p: list[Singles] = field(default_factory=list)
-    base: list[Singles] = field(default_factory=list)
-    weight: list[Singles] = field(default_factory=list)
-    node: list[Mask] = field(default_factory=list)
-    backoff: list[Singles] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        for keys in self.trie.keys:
-            size = len(keys)
-            self.stored.append(np.zeros(size, bool))
-            self.node.append(np.zeros(size, bool))
-            for column in (self.log10_p, self.base):
-                column.append(np.full(size, -np.inf, np.float32))
-            for column in (self.weight, self.backoff):
-                column.append(np.zeros(size, np.float32))
-
-    def backed_off(self, n: int) -> Singles:
-        """log10 p float32 (m_n,) of every row of order n under the model as it stands."""
-        return self.base[n - 1] + self.weight[n - 1]
-
-    def refresh(self, n: int) -> None:
-        """Bring `base` and `weight` of order n up to date with what is stored."""
-        stored, log10_p = self.stored[n - 1], self.log10_p[n - 1]
-        if n == 1:
-            self.base[0] = log10_p
-            return
-        shorter, context = self.trie.suffixes[n - 1], self.trie.prefix(n)
-        paid = np.where(self.node[n - 2], self.backoff[n - 2], np.float32(0))[context]
-        self.base[n - 1] = np.where(stored, log10_p, self.base[n - 2][shorter])
-        self.weight[n - 1] = np.where(stored, np.float32(0), self.weight[n - 2][shorter] + paid)
+from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN, Mask, NgramCounts
+from placerec.lm.discounts import Context, Floats, Rule
+from placerec.lm.draft import EPSILON, Draft, insert_prefixes, log10, p_of, weigh_contexts
+from placerec.lm.smoothings import Smoothing
+from placerec.lm.trace import SILENT, Trace
+from placerec.lm.trie import Ints, Trie, per_context, runs
 
 
 def estimate(
@@ -75,42 +23,89 @@ def estimate(
     non_events: Iterable[str] = (),
     open_vocabulary: bool = False,
 ) -> BackoffModel:
-    """The back-off model of `counts` under `smoothing` (see `placerec.lm.discounts.smoothing`).
+    """The back-off model of `counts` under `smoothing` (see `placerec.lm.smoothing`).
 
     `min_count`: n-grams of order n seen less than `min_count[n-1]` times are left out, the last entry repeats.
     `non_events`: words that are never predicted (but may be context), beside <s>; <unk> is one unless
     `open_vocabulary`. Raises LanguageModelError if no word is left to predict.
     """
-    trie = counts.trie
     if any(m < 1 for m in min_count) or not min_count:
         raise LanguageModelError(f"minimum counts {tuple(min_count)} must be 1 or more, one per order")
+    vocabulary = counts.trie.vocabulary
     silent = {*non_events, SENTENCE_START} | (set() if open_vocabulary else {UNKNOWN})
-    event = ~trie.vocabulary.mask(silent)
-    if not event.any():
+    rules = []
+    for n in range(1, counts.order + 1):
+        counts, discount = smoothing.fit(counts, n, ~vocabulary.mask(silent))
+        rules.append(Rule(discount, smoothing.interpolate, min_count[min(n, len(min_count)) - 1]))
+    draft = estimate_draft(counts, rules, non_events=non_events, open_vocabulary=open_vocabulary)
+    if not draft.event.any():
         raise LanguageModelError("the vocabulary holds no word that could be predicted; is the vocabulary file empty?")
-    draft = _Draft(trie, event)
-    _store_unigram_markers(draft, counts)
-    closed_context = _closed_contexts(trie, open_vocabulary)
-    for n in range(1, trie.order + 1):
-        minimum = min_count[min(n, len(min_count)) - 1]
-        _estimate_order(draft, counts, n, smoothing, minimum, closed_context[n - 1])
-        _weigh_contexts(draft, n)
+    insert_prefixes(draft, SILENT)
+    return draft.model()
+
+
+def estimate_draft(
+    counts: NgramCounts,
+    rules: Sequence[Rule],
+    *,
+    non_events: Iterable[str] = (),
+    open_vocabulary: bool = False,
+    unknown: str = UNKNOWN,
+    meta_tag: str | None = None,
+    trust_totals: bool = False,
+    names: Ints | None = None,
+    trace: Trace = SILENT,
+) -> Draft:
+    """The model of `counts` by one rule per order, before missing prefixes are inserted.
+
+    `unknown`: the word that stands for those outside the vocabulary.
+    `meta_tag`: words that start with it are counts of counts (section 4.5 of our SRILM specification).
+    `trust_totals`: a context's own count is its total. `names` int64 (V,): how many names each word has.
+    """
+    trie = counts.trie
+    meta = _MetaCounts.of(trie, meta_tag)
+    silent = {*non_events, SENTENCE_START} | (set() if open_vocabulary else {unknown})
+    event = ~trie.vocabulary.mask(silent) & ~meta.word
+    draft = Draft(trie, event, np.ones(len(event), np.int64) if names is None else names)
+    # <s> is listed always, other non-events where the counts hold them; <unk> never while it is one.
+    listed = ~event & ~meta.word & counts.seen[0] & ~trie.vocabulary.mask([unknown])
+    draft.stored[0] |= listed | trie.vocabulary.mask([SENTENCE_START])
+    closed = _closed_contexts(trie, None if open_vocabulary else unknown)
+    for n, rule in enumerate(rules, start=1):
+        trace.discarded_contexts(n, int((closed[n - 1] & _seen(counts, n - 1)).sum()))
+        _estimate_order(draft, counts, n, rule, closed[n - 1], meta, trust_totals, trace)
+        trace.order_done(n)
+        weigh_contexts(draft, n, trace)
         draft.refresh(n)
-    _insert_prefixes(draft)
-    return _compact(draft)
+    return draft
 
 
-def _store_unigram_markers(draft: _Draft, counts: NgramCounts) -> None:
-    """<s> is listed always, other non-events where the text holds them; <unk> never while it is one."""
-    vocabulary = draft.trie.vocabulary
-    listed = ~draft.event & counts.seen & ~vocabulary.mask([UNKNOWN])
-    draft.stored[0] |= listed | vocabulary.mask([SENTENCE_START])
+@dataclass(frozen=True)
+class _MetaCounts:
+    """Which words are meta counts (bool (V,)), and of how many occurrences each (0: the tag alone, an extra total)."""
+
+    word: Mask
+    occurrences: Ints
+
+    @staticmethod
+    def of(trie: Trie, tag: str | None) -> "_MetaCounts":
+        words = trie.vocabulary.words
+        word = np.array([tag is not None and w.startswith(tag) for w in words], bool)
+        occurrences = np.zeros(len(words), np.int64)
+        for number in np.flatnonzero(word).tolist():
+            digits = words[number].removeprefix(tag or "")
+            occurrences[number] = int(digits) if digits.isascii() and digits.isdigit() else 0
+        return _MetaCounts(word, occurrences)
 
 
-def _closed_contexts(trie: Trie, open_vocabulary: bool) -> list[Mask]:
-    """Per order n, the (n-1)-grams, bool, that nothing is estimated for: they end in </s> or hold a closed <unk>."""
+def _seen(counts: NgramCounts, n: int) -> Mask:
+    return counts.seen[n - 1] if n else np.ones(1, bool)
+
+
+def _closed_contexts(trie: Trie, closed_word: str | None) -> list[Mask]:
+    """Per order n, the (n-1)-grams, bool, that nothing is estimated for: they end in </s> or hold `closed_word`."""
     end = trie.vocabulary.mask([SENTENCE_END])
-    unknown = trie.vocabulary.mask([] if open_vocabulary else [UNKNOWN])
+    unknown = trie.vocabulary.mask([closed_word] if closed_word else [])
     closed = [np.zeros(1, bool), end | unknown]
     holds_unknown = unknown
     for n in range(2, trie.order):
@@ -120,118 +115,136 @@ def _closed_contexts(trie: Trie, open_vocabulary: bool) -> list[Mask]:
 
 
 def _estimate_order(
-    draft: _Draft, counts: NgramCounts, n: int, smoothing: Smoothing, minimum: int, closed: Mask
+    draft: Draft,
+    counts: NgramCounts,
+    n: int,
+    rule: Rule,
+    closed: Mask,
+    meta: _MetaCounts,
+    trust_totals: bool,
+    trace: Trace,
 ) -> None:
     """Sections 6.2 to 6.4: the probabilities of order n."""
-    trie, V = draft.trie, int(draft.event.sum())
-    context = trie.prefix(n) if n > 1 else np.zeros(len(trie.keys[0]), np.int64)
-    rows = np.flatnonzero(draft.event[trie.word(n)] & ~closed[context])
-    if n == 1:
-        rows = rows[counts.seen[rows]]
-    contexts, group = np.unique(context[rows], return_inverse=True)
-    count = counts.counts[n - 1][rows].astype(np.float64)
-    total = per_context(group, len(contexts), count)
-    types = per_context(group, len(contexts))
-    if n == 1:
-        lower = np.full(len(rows), np.float32(-np.log10(V)), np.float32)
-    else:
-        draft.refresh(n - 1)
-        lower = draft.backed_off(n - 1)[trie.suffixes[n - 1][rows]]
-    kept = count >= minimum
-    interpolate = np.full(len(contexts), smoothing.interpolate)
-    p = np.zeros(len(rows))
-    todo = np.ones(len(contexts), bool)
-    while todo.any():
-        at = todo[group]
-        factor, weight = smoothing.discount(count[at], total[group[at]], types[group[at]], V)
-        part = factor * count[at] / total[group[at]]
-        p[at] = np.where(interpolate[group[at]], part + weight * _p(lower[at]), part)
-        spent = per_context(group[kept & at], len(contexts), p[kept & at])
-        todo &= (types < V) & (spent > 1 - EPSILON)
-        # A context that leaves nothing to unseen words is done again, first without interpolation, then thinner.
-        total = np.where(todo & ~interpolate, total + 1, total)
-        interpolate &= ~todo
-    draft.log10_p[n - 1][rows[kept]] = np.log10(p[kept]).astype(np.float32)
-    draft.stored[n - 1][rows[kept]] = True
-
-
-def _weigh_contexts(draft: _Draft, n: int) -> None:
-    """Section 6.5: the backoff weights of all contexts of length n-1, from what order n stored."""
-    rows = np.flatnonzero(draft.stored[n - 1])
-    if n == 1:
-        rows = rows[draft.event[rows]]
-        num = 1 - _p(draft.log10_p[0][rows]).sum()
-        _spread_unigram_mass(draft, num if num >= EPSILON else 0.0)
-        return
-    context = draft.trie.prefix(n)[rows]
-    contexts, group = np.unique(context, return_inverse=True)
-    shorter = draft.backed_off(n - 1)[draft.trie.suffixes[n - 1][rows]]
-    num = 1 - per_context(group, len(contexts), _p(draft.log10_p[n - 1][rows]))
-    den = 1 - per_context(group, len(contexts), _p(shorter))
-    num[np.abs(num) < EPSILON] = 0
-    den[np.abs(den) < EPSILON] = 0
-    stuck = (den < EPSILON) & (num > EPSILON)
-    if stuck.any():
-        log.debug("order %d: %d contexts have seen every word; their probabilities are scaled to 1", n, stuck.sum())
-        scale = np.where(stuck, -np.log10(1 - np.where(stuck, num, 0)), 0).astype(np.float32)
-        draft.log10_p[n - 1][rows] += scale[group]
-        num[stuck] = den[stuck] = 0
-    overfull = ~stuck & (num < 0)
-    num[~overfull & (den <= 0)] = 0
-    den[~overfull & (den <= 0)] = 0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        weight = np.where((num < EPSILON) & (den < EPSILON), 0, np.log10(num) - np.log10(den))
-    weight[overfull] = -np.inf
-    draft.backoff[n - 2][contexts] = weight.astype(np.float32)
-    draft.node[n - 2][contexts] = True
-    node = contexts
-    for k in range(n - 1, 1, -1):
-        node = np.unique(draft.trie.suffixes[k - 1][node])
-        draft.node[k - 2][node] = True
-
-
-def _spread_unigram_mass(draft: _Draft, mass: float) -> None:
-    """Section 6.6: what the seen unigrams leave goes to the words without one, or to all if there are none."""
-    draft.stored[0] |= draft.event
-    zero = draft.event & np.isneginf(draft.log10_p[0])
-    if zero.any():
-        if mass > 0:
-            draft.log10_p[0][zero] = np.float32(np.log10(mass / zero.sum()))
-        return
-    lifted = _p(draft.log10_p[0][draft.event]) + mass / draft.event.sum()
-    draft.log10_p[0][draft.event] = np.log10(lifted).astype(np.float32)
-
-
-def _insert_prefixes(draft: _Draft) -> None:
-    """Section 6.7: a context needs a line for its weight; those that have none get their backed-off value."""
     trie = draft.trie
-    missing: list[Ints] = [np.zeros(0, np.int64)] * trie.order
-    needed = np.zeros(0, np.int64)
-    for n in range(trie.order - 1, 0, -1):
-        lacking = draft.node[n - 1] & ~draft.stored[n - 1]
-        lacking[needed[~draft.stored[n - 1][needed]]] = True
-        missing[n - 1] = np.flatnonzero(lacking)
-        needed = np.unique(trie.prefix(n)[missing[n - 1]]) if n > 1 else needed
-    for n, rows in enumerate(missing, start=1):
-        draft.refresh(n)
-        draft.log10_p[n - 1][rows] = draft.backed_off(n)[rows]
-        draft.stored[n - 1][rows] = True
-        draft.refresh(n)
+    prefix = trie.prefix(n) if n > 1 else np.zeros(len(trie.keys[0]), np.int64)
+    rows = np.flatnonzero(counts.seen[n - 1] & ~closed[prefix])
+    word = trie.word(n)[rows]
+    contexts, group = runs(prefix[rows])
+    stats = _statistics(counts, n, rows, group, len(contexts), draft.event[word], meta, word)
+    if trust_totals and n > 1:
+        stats = Context(counts.counts[n - 2][contexts].astype(np.float64), stats.types, stats.types2, stats.types3)
+    alive = stats.total[group] > 0
+    count = counts.counts[n - 1][rows].astype(np.float64)
+    if n > 1:
+        alive &= (count != 0) & ~meta.word[word]
+        trace.discarded_ngrams(n, int((alive & ~draft.event[word]).sum()), 0)
+    kept = alive & draft.event[word]
+    lower = _lower(draft, n, rows[kept])
+    size = int(draft.event.sum() + meta.word.sum())
+    _fill_order(draft, _Order(n, rule, size, rows[kept], group[kept], count[kept], lower, contexts, stats), trace)
 
 
-def _compact(draft: _Draft) -> BackoffModel:
-    """The model without the rows that hold nothing."""
-    backoffs = [
-        np.where(node, backoff, np.float32(np.nan)).astype(np.float32)[stored]
-        for node, backoff, stored in zip(draft.node, draft.backoff, draft.stored, strict=True)
-    ]
-    return BackoffModel(
-        draft.trie.keep(draft.stored),
-        tuple(log10_p[stored] for log10_p, stored in zip(draft.log10_p, draft.stored, strict=True)),
-        tuple(backoffs),
+def _lower(draft: Draft, n: int, rows: Ints) -> Singles:
+    """log10 p float32 (m,) of n-grams by the shorter context, the uniform one at the end."""
+    if n == 1:
+        return np.full(len(rows), np.float32(-np.log10(max(1, int(draft.event.sum())))), np.float32)
+    draft.refresh(n - 1)
+    return draft.backed_off(n - 1)[draft.trie.suffixes[n - 1][rows]]
+
+
+def _statistics(
+    counts: NgramCounts, n: int, rows: Ints, group: Ints, size: int, event: Mask, meta: _MetaCounts, word: Ints
+) -> Context:
+    """Section 6.2, per context (size,): totals and types over the words that are events, and what meta counts add."""
+    count = counts.counts[n - 1][rows].astype(np.float64)
+    times = meta.occurrences[word]
+    tag = meta.word[word] & (n > 1)
+    total_tag, type_tag = tag & (times == 0), tag & (times > 0)
+    return Context(
+        total=per_context(group, size, np.where(type_tag, times * count, np.where(event | total_tag, count, 0))),
+        types=per_context(group, size, np.where(type_tag, count, (event | total_tag).astype(np.float64))),
+        types2=per_context(group, size, np.where(type_tag, count * (times >= 2), event & (count >= 2))),
+        types3=per_context(group, size, np.where(type_tag, count * (times >= 3), event & (count >= 3))),
     )
 
 
-def _p(log10_p: Singles) -> Floats:
-    """Probabilities float64 of float32 log10 probabilities, by the specification's exp(x ln 10)."""
-    return np.exp(log10_p.astype(np.float64) * LN10)
+@dataclass(frozen=True)
+class _Order:
+    """What order `n` is estimated from: n-grams `rows` (m,), their counts, their log10 p by the shorter context.
+
+    `contexts[group]` are their contexts, of which `stats` tells; `size` is V with the meta words.
+    """
+
+    n: int
+    rule: Rule
+    size: int
+    rows: Ints
+    group: Ints
+    count: Floats
+    lower: Singles
+    contexts: Ints
+    stats: Context
+
+
+def _fill_order(draft: Draft, order: _Order, trace: Trace) -> None:
+    """Sections 6.3 and 6.4: store p of the n-grams of `order`."""
+    rule, n, group = order.rule, order.n, order.group
+    interpolate = np.full(len(order.contexts), rule.interpolate and rule.discount is not None)
+    total = order.stats.total
+    roomy = (order.stats.types < int(draft.event.sum())) & rule.exhaustible & (rule.discount is not None)
+    p = np.zeros(len(order.rows))
+    kept = np.zeros(len(order.rows), bool)
+    todo = np.ones(len(order.contexts), bool)
+    attempt = 0
+    while todo.any():
+        at = np.flatnonzero(todo[group])
+        p[at], kept[at] = _attempt(order, at, total, interpolate, attempt, trace)
+        used = at[kept[at]]
+        spent = per_context(group[used], len(order.contexts), p[used])
+        todo = todo & roomy & (spent > 1 - EPSILON)
+        # A context that leaves nothing to unseen words is done again, first without interpolation, then thinner.
+        again = np.flatnonzero(todo)
+        interpolated = bool(interpolate[again].any())
+        trace.no_mass(n, attempt, order.contexts[again], 1 - spent[again], interpolated=interpolated)
+        total = np.where(todo & ~interpolate, total + 1, total)
+        interpolate = interpolate & ~todo
+        attempt += 1
+    stored = order.rows[kept]
+    draft.log10_p[n - 1][stored] = log10(p[kept])
+    draft.stored[n - 1][stored] = True
+    if n > 1:
+        draft.add_nodes(n - 1, runs(draft.trie.prefix(n)[stored])[0])
+
+
+def _attempt(
+    order: _Order, at: Ints, total: Floats, interpolate: Mask, attempt: int, trace: Trace
+) -> tuple[Floats, Mask]:
+    """p of the n-grams `at` with these totals, and which of them are kept."""
+    group, count, lower, stats = order.group[at], order.count[at], order.lower[at], order.stats
+    context = Context(total[group], stats.types[group], stats.types2[group], stats.types3[group])
+    factor, weight = _discounted(order.rule, count, context, order.size)
+    mixed = interpolate[group]
+    part = factor * count / context.total
+    p = np.where(mixed, part + weight * p_of(lower), part)
+    kept = factor != 0
+    trace.probabilities(
+        order.n,
+        attempt,
+        order.rows[at][kept],
+        count[kept],
+        context.total[kept],
+        factor[kept],
+        (weight[kept], lower[kept]) if mixed.any() else None,
+        log10(p[kept]),
+    )
+    trace.discarded_ngrams(order.n, 0, int((~kept).sum()))
+    return p, kept
+
+
+def _discounted(rule: Rule, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+    """The rule's factor, 1 for counts of 0 and 0 below the minimum, and its weight of the lower order."""
+    if rule.discount is None:
+        return np.where((count > 0) & (count < rule.minimum), 0.0, 1.0), np.zeros_like(count)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor, weight = rule.discount(count, context, V)
+    return np.where(count <= 0, 1.0, np.where(count < rule.minimum, 0.0, factor)), weight

@@ -88,6 +88,20 @@ class Trie:
             found.append(word if n == 2 else self.find(n - 1, found[n - 2][self.prefix(n)], word))
         return tuple(found)
 
+    @property
+    def closed(self) -> bool:
+        """Whether every n-gram without its first word is listed too."""
+        return all(bool((rows >= 0).all()) for rows in self.suffixes)
+
+    def matrix(self, n: int) -> Ints:
+        """The word numbers of the n-grams of order n, int64 (m_n, n)."""
+        numbers = np.empty((len(self.keys[n - 1]), n), np.int64)
+        rows = np.arange(len(numbers))
+        for k in range(n, 0, -1):
+            numbers[:, k - 1] = self.word(k)[rows]
+            rows = self.prefix(k)[rows] if k > 1 else rows
+        return numbers
+
     def texts(self, n: int) -> list[str]:
         """The n-grams of order n as words joined by blanks."""
         if n == 1:
@@ -124,6 +138,34 @@ class Trie:
         return Trie(vocabulary, tuple(keys))
 
 
+def runs(values: Ints) -> tuple[Ints, Ints]:
+    """The distinct values of an ascending array int64 (m,), and for each entry which of them it is, int64 (m,)."""
+    new = np.ones(len(values), bool)
+    new[1:] = values[1:] != values[:-1]
+    return values[new], np.cumsum(new) - 1
+
+
 def per_context(prefix: Ints, size: int, values: NDArray[Any] | None = None) -> NDArray[np.float64]:
     """Sums float64 (size,) of `values` (default: ones) over the rows that share a prefix row."""
     return np.bincount(prefix, weights=values, minlength=size).astype(np.float64)
+
+
+def build_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tuple[Trie, list[list[Ints]]]:
+    """The trie of n-grams, each group a matrix of word numbers int64 (m, n), n <= order, and of all their prefixes.
+
+    Also the rows int64 (m,) of every group's n-grams' prefixes: of length 1, 2, ..., n.
+    """
+    keys = [np.arange(len(vocabulary))]
+    rows = [[matrix[:, 0]] for matrix in ngrams]
+    for n in range(2, order + 1):
+        wide = [i for i, matrix in enumerate(ngrams) if matrix.shape[1] >= n]
+        wanted = [rows[i][-1] * len(vocabulary) + ngrams[i][:, n - 1] for i in wide]
+        keys.append(np.unique(np.concatenate(wanted)) if wide else np.zeros(0, np.int64))
+        for i, key in zip(wide, wanted, strict=True):
+            rows[i].append(np.searchsorted(keys[-1], key))
+    return Trie(vocabulary, tuple(keys)), rows
+
+
+def endings(ngrams: Ints) -> list[Ints]:
+    """The n-grams without their first word, without their first two, ...: matrices (m, n-1), ..., (m, 1)."""
+    return [ngrams[:, start:] for start in range(1, ngrams.shape[1])]

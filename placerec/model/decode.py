@@ -8,7 +8,7 @@ from pathlib import Path
 
 from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
-from placerec.hohmm import Beliefs, Recognizer, format_header, format_row
+from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, format_row
 from placerec.model.corpus import STREAM_SUFFIXES, dictionary_of, read_streams, stream_files
 from placerec.model.load import PlaceModels, load_model, make_recognizer
 from placerec.words import WordStream
@@ -99,18 +99,8 @@ def _spare_sources(sources: Sequence[Path | str], out: Path) -> None:
 
 def format_beliefs(beliefs: Beliefs, *, as_json: bool = False) -> str:
     """The text of a beliefs file: TSV with a header, or one JSON object a line."""
-    rows = zip(
-        beliefs.frames,
-        beliefs.times.tolist(),
-        beliefs.truth,
-        beliefs.words,
-        beliefs.selected.tolist(),
-        beliefs.best,
-        beliefs.belief.tolist(),
-        strict=True,
-    )
     lines = [] if as_json else [format_header(beliefs.places)]
-    lines += [_line(beliefs.places, *row, as_json=as_json) for row in rows]
+    lines += [_line(beliefs.places, *row, as_json=as_json) for row in belief_rows(beliefs)]
     return "".join(f"{line}\n" for line in lines)
 
 

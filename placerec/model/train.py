@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from placerec.errors import ModelError
+from placerec.errors import LanguageModelError, ModelError
 from placerec.files import whole_folder, write_text
 from placerec.frames.places import check_place, check_twins
 from placerec.lm import (
@@ -28,6 +28,7 @@ from placerec.lm import (
     write_arpa,
 )
 from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
 from placerec.model.corpus import read_corpus
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, format_sentences, write_vocabulary
@@ -43,13 +44,13 @@ Progress = Callable[[int, int], None]
 class Options:
     """How language models are made; every name is that of the command line.
 
-    `order`: n-gram order (1: the classical HMM). `min_count`: per order, the last repeats. `markers`: whether <s> and
-    </s> are counted.
+    `order`: n-gram order (1: the classical HMM). `delta`: see `placerec.lm.smoothing`; None for its default.
+    `min_count`: per order, the last repeats. `markers`: whether <s> and </s> are counted.
     """
 
     order: int = 2
     smoothing: str = "witten-bell"
-    delta: float = 1.0
+    delta: float | None = None
     min_count: tuple[int, ...] = (1,)
     markers: bool = False
     select: Selection = Selection()
@@ -68,12 +69,9 @@ def parse_min_count(text: str) -> tuple[int, ...]:
 def train_place(sentences: Sentences, vocabulary: Sequence[str], options: Options) -> tuple[BackoffModel, str]:
     """The language model of one place (V = all words of `vocabulary`), and the text of its counts file."""
     counts = count_ngrams(sentences, options.order, vocabulary=vocabulary, markers=options.markers)
-    model = estimate(
-        counts,
-        smoothing(options.smoothing, options.delta),
-        min_count=options.min_count,
-        non_events=() if options.markers else (SENTENCE_END,),
-    )
+    non_events = () if options.markers else (SENTENCE_END,)
+    rule = smoothing(options.smoothing, options.delta)
+    model = estimate(counts, rule, min_count=options.min_count, non_events=non_events)
     return with_unigrams(model, (UNKNOWN, SENTENCE_START, SENTENCE_END)), format_counts(counts)
 
 
@@ -124,7 +122,10 @@ def train_model(
         for done, (place, text) in enumerate(sentences.items()):
             if not text:
                 log.warning("place %s: no visit holds a selected word; its model is uniform", place)
-            model, counts = train_place(text, vocabulary, options)
+            try:
+                model, counts = train_place(text, vocabulary, options)
+            except LanguageModelError as error:
+                raise LanguageModelError(f"place {place}: {error}") from error
             write_text(folder / "sentences" / f"{place}.txt", format_sentences(text))
             write_text(folder / "counts" / f"{place}.counts", counts)
             write_arpa(model, folder / f"{place}.arpa", comment=signature(place, len(vocabulary), options))
@@ -136,7 +137,7 @@ def train_model(
 
 def signature(place: str, words: int, options: Options) -> str:
     """What made a model, in one line: the first line of its ARPA file."""
-    delta = f" delta={options.delta:g}" if options.smoothing.startswith("lidstone") else ""
+    delta = f" delta={_delta(options):g}" if options.smoothing.startswith(("lidstone", "absolute")) else ""
     return (
         f"placerec {__version__} place={place} order={options.order} smoothing={options.smoothing}{delta}"
         f" select={options.select} min-count={','.join(map(str, options.min_count))}"
@@ -146,12 +147,8 @@ def signature(place: str, words: int, options: Options) -> str:
 
 def ngram_count_command(place: str, options: Options) -> str | None:
     """The SRILM command that makes the same model of the same sentences, run in MODEL/; None where there is none."""
-    smoothings = {
-        "witten-bell": "-wbdiscount -interpolate",
-        "witten-bell-backoff": "-wbdiscount",
-        "lidstone-backoff": f"-addsmooth {options.delta:g}",
-    }
-    if options.smoothing not in smoothings:
+    method = SRILM_OPTIONS[options.smoothing]
+    if method is None:
         return None
     minima = [options.min_count[min(n, len(options.min_count)) - 1] for n in range(1, options.order + 1)]
     return " ".join(
@@ -160,10 +157,14 @@ def ngram_count_command(place: str, options: Options) -> str | None:
             *([] if options.markers else ["-nonevents nonevents.txt -no-sos -no-eos"]),
             f"-order {options.order}",
             *(f"-gt{n}min {minimum}" for n, minimum in enumerate(minima, start=1)),
-            smoothings[options.smoothing],
+            method.format(delta=_delta(options)),
             f"-lm {place}.arpa",
         ]
     )
+
+
+def _delta(options: Options) -> float:
+    return default_delta(options.smoothing) if options.delta is None else options.delta
 
 
 def describe_model(
@@ -176,7 +177,7 @@ def describe_model(
         "places": list(places),
         "order": options.order,
         "smoothing": options.smoothing,
-        "delta": options.delta,
+        "delta": _delta(options),
         "min_count": list(options.min_count),
         "markers": options.markers,
         "select": str(options.select),

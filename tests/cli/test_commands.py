@@ -13,9 +13,10 @@ from small import PLACES, run_through, write_images, write_tokens
 from placerec.cli import commands
 from placerec.cli.train_lm import SMOOTHING_NAMES
 from placerec.lm import SMOOTHINGS
+from placerec.srilm.run import TOOLS
 from placerec.words import write_stream
 
-NAMES = sorted(commands.commands)
+NAMES = sorted(set(commands.commands) - set(TOOLS))
 
 
 def placerec(*args: object, stdin: str | bytes | None = None) -> Result:
@@ -70,13 +71,20 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_all_commands_of_the_contract_so_far_are_there() -> None:
     expected = "check decode demo describe evaluate inspect lab tokenize train-lm train-words"
     assert " ".join(NAMES) == expected
-    assert len(commands.commands) == 10
+    assert set(commands.commands) == {*NAMES, *TOOLS}
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_every_tool_of_srilm_helps(tool: str) -> None:
+    text = done(tool, "--help").stdout
+    assert text == done(tool, "-h").stdout
+    assert f"\nExample: placerec {tool} " in text
 
 
 def test_the_list_of_commands_is_not_cut_off() -> None:
     text = done("--help").stdout
     assert "..." not in text.partition("Commands:")[2].partition("Your own images")[0]
-    for name in NAMES:
+    for name in commands.commands:
         assert re.search(rf"^  {name} +[A-Z].*\.$", text, re.MULTILINE), name
 
 

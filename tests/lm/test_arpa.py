@@ -28,7 +28,7 @@ GOOD = (
 
 @settings(max_examples=30, deadline=None)
 @given(
-    name=st.sampled_from(list(SMOOTHINGS)),
+    name=st.sampled_from([name for name in SMOOTHINGS if "kneser-ney" not in name]),
     order=st.integers(1, 5),
     sentences=st.lists(st.lists(st.sampled_from(["a", "é", "b#", "\\c"]), max_size=8), max_size=5),
     markers=st.booleans(),

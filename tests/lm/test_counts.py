@@ -66,4 +66,4 @@ def test_counts_file_puts_extensions_behind_their_prefix() -> None:
 def test_nothing_to_count() -> None:
     counts = count_ngrams([], 3, vocabulary=["a"], markers=False)
     assert as_counter(counts) == {}
-    assert not counts.seen.any()
+    assert not counts.seen[0].any()

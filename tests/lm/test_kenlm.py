@@ -26,7 +26,7 @@ def write_model(path: Path, name: str, order: int, *, markers: bool = False, see
 
 @pytest.mark.parametrize("markers", [False, True])
 @pytest.mark.parametrize("order", range(1, 7))
-@pytest.mark.parametrize("name", SMOOTHINGS)
+@pytest.mark.parametrize("name", [name for name in SMOOTHINGS if "kneser-ney" not in name])
 def test_kenlm_agrees_in_silence(
     name: str, order: int, markers: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

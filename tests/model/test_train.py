@@ -21,6 +21,9 @@ from placerec.model.train import ngram_count_command
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, sentences_per_place
 
+# Kneser-Ney fails on few words, and says so; tests/lm/test_smoothings.py has its tests.
+SAFE = [name for name in SMOOTHINGS if "kneser-ney" not in name]
+
 SENTENCES = sentences_per_place([run_through("run1", 0), run_through("run2", 1)], Selection())
 KITCHEN = {"kitchen": [["a", "b", "a"], ["b"]]}
 
@@ -197,7 +200,7 @@ def test_what_cannot_be_trained_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", SMOOTHINGS)
+@pytest.mark.parametrize("name", SAFE)
 def test_a_place_without_words_is_uniform(tmp_path: Path, name: str, caplog: pytest.LogCaptureFixture) -> None:
     train_model({"attic": [], **KITCHEN}, ("a", "b", "c", "d"), tmp_path, options=Options(3, name))
     assert "place attic: no visit holds a selected word; its model is uniform" in caplog.text
@@ -209,7 +212,7 @@ def test_a_place_without_words_is_uniform(tmp_path: Path, name: str, caplog: pyt
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
-@pytest.mark.parametrize("name", SMOOTHINGS)
+@pytest.mark.parametrize("name", SAFE)
 def test_after_every_history_all_words_are_possible_and_sum_to_1(tmp_path: Path, name: str, order: int) -> None:
     """Without markers a model is closed: the K words share all the probability, after any history whatever."""
     vocabulary = ("a", "b", "c", "d")
@@ -224,7 +227,7 @@ def test_after_every_history_all_words_are_possible_and_sum_to_1(tmp_path: Path,
         assert p.sum() == pytest.approx(1, abs=5e-6), history
 
 
-@pytest.mark.parametrize("name", SMOOTHINGS)
+@pytest.mark.parametrize("name", SAFE)
 def test_with_markers_the_end_of_a_visit_is_one_more_event(tmp_path: Path, name: str) -> None:
     vocabulary = ("a", "b", "c", "d")
     train_model({"hall": [list("abac"), list("b")]}, vocabulary, tmp_path, options=Options(2, name, markers=True))
@@ -237,7 +240,7 @@ def test_with_markers_the_end_of_a_visit_is_one_more_event(tmp_path: Path, name:
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4, 5, 6])
-@pytest.mark.parametrize("name", SMOOTHINGS)
+@pytest.mark.parametrize("name", SAFE)
 def test_kenlm_reads_every_model_in_silence_and_agrees(tmp_path: Path, name: str, order: int) -> None:
     pytest.importorskip("kenlm")
     train_model(SENTENCES, VOCABULARY, tmp_path, options=Options(order, name, 0.5))

@@ -1,0 +1,48 @@
+"""SRILM's tools as commands: arguments go through untouched, for the tools have their own rules for options."""
+
+import sys
+
+import click
+
+from placerec.srilm.run import TOOLS, run
+
+_PURPOSES = {
+    "ngram-count": "SRILM's tool: count n-grams, estimate models.",
+    "ngram": "SRILM's tool: score text; mix, prune models.",
+    "ngram-merge": "SRILM's tool: add up sorted counts files.",
+    "compute-best-mix": "SRILM's tool: weights for a mixture of models.",
+    "change-lm-vocab": "SRILM's tool: change a model's vocabulary.",
+    "add-ppls": "SRILM's tool: add up ngram -ppl outputs.",
+}
+
+
+_EXAMPLES = {
+    "ngram-count": "-text train.txt -order 3 -wbdiscount -interpolate -lm train.lm",
+    "ngram": "-order 3 -lm train.lm -ppl test.txt",
+    "ngram-merge": "-write all.counts monday.counts tuesday.counts",
+    "compute-best-mix": "a.ppl b.ppl",
+    "change-lm-vocab": "-vocab words.txt -lm train.lm -write-lm new.lm",
+    "add-ppls": "monday.ppl tuesday.ppl",
+}
+
+
+class Tool(click.Command):
+    """A command that leaves its arguments, `--` too, to the tool of its name; `--help` alone says what it is for."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Keep the arguments as they are."""
+        if args in (["-h"], ["--help"]):
+            click.echo(
+                f"{_PURPOSES[str(self.name)]}\n\nIts options are SRILM's: docs/srilm.md, or -help, lists them.\n"
+            )
+            click.echo(f"Example: placerec {self.name} {_EXAMPLES[str(self.name)]}")
+            ctx.exit()
+        ctx.args = list(args)
+        return ctx.args
+
+    def invoke(self, ctx: click.Context) -> None:
+        """Run the tool and end with its exit status."""
+        sys.exit(run(str(self.name), ctx.args, shown=f"placerec {self.name}"))
+
+
+SRILM_COMMANDS = tuple(Tool(tool, short_help=_PURPOSES[tool], add_help_option=False) for tool in TOOLS)

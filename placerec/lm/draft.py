@@ -1,0 +1,285 @@
+"""A model in the making: backed-off values, backoff weights, left-over mass; section 6 of our SRILM specification.
+
+Log probabilities and weights are stored in float32 and computed in float64 from what is stored: the roundings, and
+the order of the operations, are what makes the printed digits equal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.lm.backoff import BackoffModel, Singles
+from placerec.lm.gather import trie_of
+from placerec.lm.trace import Trace
+from placerec.lm.trie import Ints, Trie, Vocabulary, build_trie, endings, per_context
+
+EPSILON = 3e-6
+LN10 = 2.30258509299404568402
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def p_of(log10_p: Singles) -> Floats:
+    """Probabilities float64 of float32 log10 probabilities, by the specification's exp(x ln 10)."""
+    return np.exp(log10_p.astype(np.float64) * LN10)
+
+
+def log10(p: Floats) -> Singles:
+    """float32 log10 of float64 probabilities; -inf for 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log10(p).astype(np.float32)
+
+
+@dataclass
+class Draft:
+    """A back-off model while it changes; every array lies beside the rows of `trie`, which lists every ending.
+
+    `event` (V,): words that can be predicted; `names` (V,): how many names a word has (aliases). `stored`: has a log
+    probability of its own, `log10_p`. `node`: is a context of the model, with the weight `backoff`. `base` + `weight`:
+    the log probability by back-off, `base` of the longest stored ending and `weight` the backoff weights paid on the
+    way, summed from short contexts to long.
+    """
+
+    trie: Trie
+    event: Mask
+    names: Ints = field(default_factory=lambda: np.ones(0, np.int64))
+    stored: list[Mask] = field(default_factory=list)
+    log10_p: list[Singles] = field(default_factory=list)
+    node: list[Mask] = field(default_factory=list)
+    backoff: list[Singles] = field(default_factory=list)
+    base: list[Singles] = field(default_factory=list)
+    weight: list[Singles] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if not len(self.names):
+            self.names = np.ones(len(self.event), np.int64)
+        for keys in self.trie.keys:
+            for mask in (self.stored, self.node):
+                mask.append(np.zeros(len(keys), bool))
+            for column in (self.log10_p, self.base):
+                column.append(np.full(len(keys), -np.inf, np.float32))
+            for column in (self.backoff, self.weight):
+                column.append(np.zeros(len(keys), np.float32))
+
+    @property
+    def order(self) -> int:
+        return self.trie.order
+
+    def backed_off(self, n: int) -> Singles:
+        """log10 p float32 (m_n,) of every row of order n; `refresh` first."""
+        return self.base[n - 1] + self.weight[n - 1]
+
+    def refresh(self, n: int) -> None:
+        """Bring the backed-off values of order n up to date with what is stored; shorter orders must be."""
+        if n == 1:
+            self.base[0] = self.log10_p[0]
+            return
+        stored, shorter, context = self.stored[n - 1], self.trie.suffixes[n - 1], self.trie.prefix(n)
+        paid = np.where(self.node[n - 2], self.backoff[n - 2], np.float32(0))[context]
+        self.base[n - 1] = np.where(stored, self.log10_p[n - 1], self.base[n - 2][shorter])
+        self.weight[n - 1] = np.where(stored, np.float32(0), self.weight[n - 2][shorter] + paid)
+
+    def refresh_all(self) -> None:
+        """Bring all backed-off values up to date."""
+        for n in range(1, self.order + 1):
+            self.refresh(n)
+
+    def add_nodes(self, n: int, rows: Ints) -> None:
+        """Make rows of order n contexts; a context's ending is one too."""
+        for k in range(n, 0, -1):
+            self.node[k - 1][rows] = True
+            if k > 1:
+                shorter = np.zeros(len(self.node[k - 2]), bool)
+                shorter[self.trie.suffixes[k - 1][rows]] = True
+                rows = np.flatnonzero(shorter)
+
+    def model(self) -> BackoffModel:
+        """The model without the rows that hold nothing."""
+        backoffs = [
+            np.where(node, backoff, np.float32(np.nan)).astype(np.float32)[stored]
+            for node, backoff, stored in zip(self.node, self.backoff, self.stored, strict=True)
+        ]
+        return BackoffModel(
+            self.trie.keep(self.stored),
+            tuple(log10_p[stored] for log10_p, stored in zip(self.log10_p, self.stored, strict=True)),
+            tuple(backoffs),
+        )
+
+
+def drafts_of(models: Sequence[BackoffModel], non_events: Sequence[str], words: Sequence[str] = ()) -> list[Draft]:
+    """Drafts of models over one trie, that of all their n-grams; `words` are added to the vocabulary."""
+    vocabulary = Vocabulary.of([word for model in models for word in model.words] + list(words))
+    return unite([_draft_of(model) for model in models], vocabulary, ~vocabulary.mask(non_events))
+
+
+def _draft_of(model: BackoffModel) -> Draft:
+    trie = model.trie
+    if not trie.closed:
+        groups = [trie.matrix(n) for n in range(1, trie.order + 1)]
+        ends = [end for group in groups for end in endings(group)]
+        trie, _ = build_trie(trie.vocabulary, trie.order, [*groups, *ends])
+    draft = Draft(trie, np.ones(len(trie.vocabulary), bool))
+    rows = np.arange(len(trie.vocabulary))
+    for n in range(1, model.order + 1):
+        rows = trie.find(n, rows[model.trie.prefix(n)], model.trie.word(n)) if n > 1 else rows
+        draft.stored[n - 1][rows] = True
+        draft.log10_p[n - 1][rows] = model.log10_ps[n - 1]
+        backoff = model.backoffs[n - 1]
+        is_node = ~np.isnan(backoff)
+        draft.backoff[n - 1][rows[is_node]] = backoff[is_node]
+        draft.add_nodes(n, rows[is_node])
+    draft.refresh_all()
+    return draft
+
+
+def unite(drafts: Sequence[Draft], vocabulary: Vocabulary, event: Mask, names: Ints | None = None) -> list[Draft]:
+    """The same models over one trie, that of all their rows and of `vocabulary`, which must list all their words.
+
+    `event` and `names` (V,) as in Draft.
+    """
+    order = max(draft.order for draft in drafts)
+    groups = []
+    for draft in drafts:
+        renumbered = vocabulary.ids(draft.trie.vocabulary.words)
+        groups += [renumbered[draft.trie.matrix(n)] for n in range(1, draft.order + 1)]
+    trie, rows = trie_of(vocabulary, order, groups)
+    united, place = [], iter(rows)
+    for draft in drafts:
+        wider = Draft(trie, event) if names is None else Draft(trie, event, names)
+        for n in range(1, draft.order + 1):
+            row = next(place)[-1]
+            wider.stored[n - 1][row] = draft.stored[n - 1]
+            wider.log10_p[n - 1][row] = draft.log10_p[n - 1]
+            wider.node[n - 1][row] = draft.node[n - 1]
+            wider.backoff[n - 1][row] = draft.backoff[n - 1]
+        wider.refresh_all()
+        united.append(wider)
+    return united
+
+
+def weigh_contexts(draft: Draft, n: int, trace: Trace, *, minimum: float | None = None) -> None:
+    """Section 6.5: the backoff weights of all contexts of length n-1, from the stored n-grams of order n.
+
+    `minimum`: the least mass that backing off must leave (`-minbackoff`, section 11.1).
+    """
+    rows = np.flatnonzero(draft.stored[n - 1])
+    if n == 1:
+        left = float(1 - p_of(draft.log10_p[0][rows]).sum())
+        if minimum is not None and 0 - left > EPSILON:
+            left = _scale_unigrams(draft, rows, left, trace)
+        left = 0.0 if abs(left) < EPSILON else left
+        if left < 0:
+            trace.overfull_contexts(1, np.zeros(1, np.int64), np.array([left]))
+            return
+        trace.weights(1, np.zeros(1, np.int64), np.array([left]), np.ones(1), log10(np.array([left])))
+        spread_unigram_mass(draft, left, trace)
+        return
+    contexts = np.flatnonzero(draft.node[n - 2])
+    group = np.searchsorted(contexts, draft.trie.prefix(n)[rows])
+    num, den = context_masses(draft, n, contexts, rows, group)
+    if minimum is not None:
+        num = _keep_minimum(draft, n, rows, group, contexts, num, minimum, trace)
+    num[np.abs(num) < EPSILON] = 0
+    den[np.abs(den) < EPSILON] = 0
+    num, den, overfull = settle_masses(draft, n, rows, group, contexts, num, den, trace)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weight = np.where((num < EPSILON) & (den < EPSILON), 0, np.log10(num) - np.log10(den)).astype(np.float32)
+    weight[overfull] = -np.inf
+    draft.backoff[n - 2][contexts] = weight
+    trace.weights(n, contexts, num, den, weight)
+
+
+def context_masses(draft: Draft, n: int, contexts: Ints, rows: Ints, group: Ints) -> tuple[Floats, Floats]:
+    """What the n-grams `rows` leave, per context: 1 - sum p, and 1 - sum p by the shorter context, float64 (C,)."""
+    shorter = draft.backed_off(n - 1)[draft.trie.suffixes[n - 1][rows]]
+    num = 1 - per_context(group, len(contexts), p_of(draft.log10_p[n - 1][rows]))
+    den = 1 - per_context(group, len(contexts), p_of(shorter))
+    return num, den
+
+
+def settle_masses(
+    draft: Draft, n: int, rows: Ints, group: Ints, contexts: Ints, num: Floats, den: Floats, trace: Trace
+) -> tuple[Floats, Floats, Mask]:
+    """Steps 2 to 4 of section 6.5: contexts that have seen every word are scaled, and what cannot be is reported."""
+    stuck = (den < EPSILON) & (num > EPSILON)
+    if stuck.any():
+        trace.full_contexts(n, contexts[stuck])
+        scale = np.where(stuck, -np.log10(1 - np.where(stuck, num, 0)), 0).astype(np.float32)
+        draft.log10_p[n - 1][rows] += scale[group]
+    num, den = np.where(stuck, 0, num), np.where(stuck, 0, den)
+    overfull = num < 0
+    if overfull.any():
+        trace.overfull_contexts(n, contexts[overfull], num[overfull])
+    nothing = ~overfull & (den <= 0)
+    return np.where(nothing, 0, num), np.where(nothing, 0, den), overfull
+
+
+def _keep_minimum(
+    draft: Draft,
+    n: int,
+    rows: Ints,
+    group: Ints,
+    contexts: Ints,
+    num: Floats,
+    minimum: float,
+    trace: Trace,
+) -> Floats:
+    scarce = minimum - num > EPSILON
+    if scarce.any():
+        trace.scarce_contexts(n, contexts[scarce], num[scarce], minimum)
+        scale = np.where(scarce, np.log10(1 - minimum) - np.log10(1 - np.where(scarce, num, 0)), 0).astype(np.float32)
+        draft.log10_p[n - 1][rows] += scale[group]
+    return np.where(scarce, minimum, num)
+
+
+def _scale_unigrams(draft: Draft, rows: Ints, left: float, trace: Trace) -> float:
+    trace.scarce_contexts(1, np.zeros(1, np.int64), np.array([left]), 0.0)
+    draft.log10_p[0][rows] += np.float32(-np.log10(1 - left))
+    return 0.0
+
+
+def spread_unigram_mass(draft: Draft, mass: float, trace: Trace) -> None:
+    """Section 6.6: what the seen unigrams leave goes to the words without one, or to all if there are none."""
+    draft.stored[0] |= draft.event
+    zero = draft.event & np.isneginf(draft.log10_p[0])
+    if zero.any():
+        # SRILM shares by names: a word with an alias takes one share and leaves the other.
+        shares = int(draft.names[zero].sum())
+        trace.unigram_mass(mass, shares, everyone=False)
+        if mass > 0:
+            draft.log10_p[0][zero] = np.float32(np.log10(mass / shares))
+        return
+    size = int(draft.event.sum())
+    if mass > 0:
+        trace.unigram_mass(mass, size, everyone=True)
+    draft.log10_p[0][draft.event] = log10(p_of(draft.log10_p[0][draft.event]) + mass / max(1, size))
+
+
+def insert_prefixes(draft: Draft, trace: Trace) -> None:
+    """Section 6.7: a context needs a line for its weight; those that have none get their backed-off value."""
+    trie = draft.trie
+    missing: list[Ints] = [np.zeros(0, np.int64)] * trie.order
+    needed = np.zeros(0, np.int64)
+    for n in range(trie.order - 1, 0, -1):
+        lacking = draft.node[n - 1] & ~draft.stored[n - 1]
+        lacking[needed[~draft.stored[n - 1][needed]]] = True
+        missing[n - 1] = np.flatnonzero(lacking)
+        needed = np.unique(trie.prefix(n)[missing[n - 1]]) if n > 1 else needed
+    for n, rows in enumerate(missing, start=1):
+        draft.refresh(n)
+        draft.log10_p[n - 1][rows] = draft.backed_off(n)[rows]
+        draft.stored[n - 1][rows] = True
+        if n > 1:
+            draft.add_nodes(n - 1, np.unique(trie.prefix(n)[rows]))
+        draft.refresh(n)
+        if len(rows):
+            trace.inserted(n, rows)
+
+
+def reweigh(draft: Draft, trace: Trace, *, minimum: float | None = None) -> None:
+    """Recompute all backoff weights, and spread what the unigrams leave (`-renorm`, section 11.1)."""
+    for n in range(1, draft.order + 1):
+        weigh_contexts(draft, n, trace, minimum=minimum)
+        draft.refresh(n)

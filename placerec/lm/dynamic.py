@@ -1,0 +1,83 @@
+"""Mixtures that are computed while a text is scored: section 11.5 of our SRILM specification.
+
+Probabilities of components are given as log10, float32, stacked: (K, T) for K models and T words.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from placerec.lm.backoff import Singles
+from placerec.lm.draft import LN10, Floats, Mask, log10, p_of
+from placerec.lm.trie import Ints
+
+
+def mixed(log10_ps: Singles, weights: Floats) -> Singles:
+    """log10 of the mean probability, float32 (T,); `weights` (K,), or (K, T) for each word, need not sum to 1."""
+    weights = weights[:, None] if weights.ndim == 1 else weights
+    total = np.zeros(log10_ps.shape[1])
+    for log10_p, weight in zip(log10_ps, weights, strict=True):
+        total += weight * p_of(log10_p)
+    return log10(total / _sum(weights))
+
+
+def posteriors(weights: Sequence[float], joints: Singles, scale: float) -> Floats:
+    """The weights (K, T) after the models have been seen to give the recent words log10 p `joints` (K, T).
+
+    Each weight is multiplied by 10^(scale * joint), and they sum to 1; where all vanish they are the plain ones.
+    """
+    plain = np.array(weights, np.float64)[:, None]
+    with np.errstate(invalid="ignore"):
+        seen = plain * np.exp((scale * joints.astype(np.float64)).astype(np.float32).astype(np.float64) * LN10)
+    seen = np.nan_to_num(seen)
+    total = _sum(seen)
+    return np.where(total > 0, seen, plain) / np.where(total > 0, total, plain.sum())
+
+
+def loglinear(log10_ps: Singles, weights: Sequence[float]) -> Singles:
+    """The weighted sum of the log probabilities, float32 (T,), not normalised."""
+    total = np.zeros(log10_ps.shape[1:], np.float32)
+    for log10_p, weight in zip(log10_ps, weights, strict=True):
+        if weight:
+            total = (total + (weight * log10_p.astype(np.float64))).astype(np.float32)
+    return total
+
+
+def _sum(weights: Floats) -> Floats:
+    total = np.zeros(weights.shape[1])
+    for weight in weights:
+        total = total + weight
+    return total
+
+
+class Cache:
+    """The last `size` words before each word of a text, as an estimate of its probability.
+
+    `ids` int64 (T,) is the text; `counted` bool (T,) the words that enter the cache.
+    """
+
+    def __init__(self, ids: Ints, counted: Mask, size: int) -> None:
+        places = np.flatnonzero(counted)
+        self.stop: Ints = np.cumsum(counted) - counted
+        self.start = np.maximum(0, self.stop - size)
+        self.words = ids[places]
+        # Word by word, in the order of the text: how often a word stands between two places is a difference.
+        self._width = len(places) + 1
+        self._sorted = np.sort(self.words * self._width + np.arange(len(places)))
+
+    def shares(self, words: Ints) -> Floats:
+        """The share of the cache that each of `words` (T,) has in its place, float64 (T,); 0 where it is empty."""
+        held = np.searchsorted(self._sorted, words * self._width + self.stop)
+        held = held - np.searchsorted(self._sorted, words * self._width + self.start)
+        shares: Floats = np.where(words >= 0, held, 0) / np.maximum(1, self.stop - self.start)
+        return shares
+
+    def spread(self, t: int, size: int) -> Floats:
+        """The share of each of `size` words in the cache at word `t`, float64 (size,)."""
+        recent = self.words[self.start[t] : self.stop[t]]
+        return np.bincount(recent, minlength=size)[:size] / max(1, len(recent))
+
+
+def with_cache(log10_p: Singles, shares: Floats, weight: float) -> Singles:
+    """log10 of (1 - weight) p + weight * share, float32 (T,); the share takes the way over its float32 logarithm."""
+    return log10((1 - weight) * p_of(log10_p) + weight * p_of(log10(shares)))

@@ -1,0 +1,141 @@
+"""What the probabilities of a text's words sum up to: sections 10.1 and 10.2 of our SRILM specification."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from placerec.lm.backoff import BackoffModel, Singles, score_ids
+from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.draft import EPSILON, LN10, Floats, Mask
+from placerec.lm.trie import Ints
+
+TOP_RANKS = (1, 5, 10)
+
+
+@dataclass(frozen=True)
+class Totals:
+    """Sums over a text. Words without probability are counted (`oovs`: unknown, `zeroprobs`: known), not penalised.
+
+    `log10_p`: of the others; `words`: without the </s> at sentence ends.
+    """
+
+    sentences: float = 0
+    words: float = 0
+    oovs: float = 0
+    zeroprobs: float = 0
+    log10_p: float = 0
+
+    def __add__(self, other: "Totals") -> "Totals":
+        return Totals(
+            self.sentences + other.sentences,
+            self.words + other.words,
+            self.oovs + other.oovs,
+            self.zeroprobs + other.zeroprobs,
+            self.log10_p + other.log10_p,
+        )
+
+    def times(self, weight: float) -> "Totals":
+        """The same text, counted `weight` times."""
+        return Totals(
+            *(weight * value for value in (self.sentences, self.words, self.oovs, self.zeroprobs, self.log10_p))
+        )
+
+    @property
+    def perplexity(self) -> float | None:
+        """Per word and sentence end; None where nothing was predicted."""
+        return _perplexity(self.log10_p, self.words - self.oovs - self.zeroprobs + self.sentences)
+
+    @property
+    def perplexity_per_word(self) -> float | None:
+        """Per word, sentence ends' probabilities included but not counted (SRILM's ppl1)."""
+        return _perplexity(self.log10_p, self.words - self.oovs - self.zeroprobs)
+
+
+def _perplexity(log10_p: float, predicted: float) -> float | None:
+    if predicted <= 0:
+        return None
+    with np.errstate(over="ignore"):
+        return float(np.exp(np.float64(-(log10_p / predicted) * LN10)))
+
+
+def measure(model: BackoffModel, sentences: Iterable[Iterable[str]]) -> Totals:
+    """The totals of sentences of words, each scored between <s> and </s>; no context spans two sentences."""
+    total = Totals()
+    for sentence in sentences:
+        words = [SENTENCE_START, *sentence, SENTENCE_END]
+        ids = model.ids(words)
+        unknown = np.array([word not in model or word == UNKNOWN for word in words[1:]], bool)
+        log10_p = score_ids(model, ids)[0][1:].astype(np.float32)
+        total += tally(log10_p, unknown, ended=True)
+    return total
+
+
+def tally(log10_p: Singles, unknown: Mask, *, ended: bool) -> Totals:
+    """The totals of one sentence's words: `log10_p` float32 (T,), `unknown` bool (T,); `ended`: the last is </s>."""
+    (row,) = tally_sentences(log10_p, unknown, np.zeros(len(log10_p), np.int64), np.array([ended]))
+    return Totals(*row.tolist())
+
+
+def tally_sentences(log10_p: Singles, unknown: Mask, sentence: Ints, ended: Mask) -> Floats:
+    """The same sentence by sentence, float64 (S, 5), columns as the fields of Totals.
+
+    `sentence` int64 (T,): the number of each word's sentence; `ended` bool (S,): its last word is the sentence's end.
+    """
+    size = len(ended)
+    zero = np.isneginf(log10_p)
+    ends = ended.astype(np.float64)
+    return np.stack(
+        [
+            ends,
+            np.bincount(sentence, minlength=size) - ends,
+            np.bincount(sentence[zero & unknown], minlength=size),
+            np.bincount(sentence[zero & ~unknown], minlength=size),
+            np.bincount(sentence[~zero], weights=log10_p[~zero].astype(np.float64), minlength=size),
+        ],
+        axis=1,
+    )
+
+
+@dataclass(frozen=True)
+class Ranks:
+    """How well words are told from others: `tokens` and, of them, `words` (without sentence ends).
+
+    `leading` and `leading_words` (3,): tokens and words whose rank is below 1, 5 and 10. `square` and `absolute`: the
+    sums of (1-p)^2 and 1-p.
+    """
+
+    words: float = 0
+    tokens: float = 0
+    leading_words: tuple[float, ...] = (0, 0, 0)
+    leading: tuple[float, ...] = (0, 0, 0)
+    square: float = 0
+    absolute: float = 0
+
+    def __add__(self, other: "Ranks") -> "Ranks":
+        return Ranks(
+            self.words + other.words,
+            self.tokens + other.tokens,
+            tuple(a + b for a, b in zip(self.leading_words, other.leading_words, strict=True)),
+            tuple(a + b for a, b in zip(self.leading, other.leading, strict=True)),
+            self.square + other.square,
+            self.absolute + other.absolute,
+        )
+
+
+def rank_word(log10_p: float, everyone: Singles, *, known: bool, end: bool, weight: float = 1) -> Ranks:
+    """The ranks of one token among words of log10 p `everyone`; `known`: not unknown; `end`: a sentence end."""
+    p = math.exp(log10_p * LN10)
+    place = rank(p, np.exp(everyone.astype(np.float64) * LN10))
+    leading = tuple(weight * (place < top) for top in TOP_RANKS)
+    loss = 1 - p if p > 0 or known else 0.0
+    word = 0 if end else weight
+    none = (0.0, 0.0, 0.0)
+    return Ranks(word, weight, none if end else leading, leading, weight * loss * loss, weight * loss)
+
+
+def rank(p: float, all_p: Floats) -> int:
+    """How many words are more probable than a word of probability `p`; of those as probable as it, half count."""
+    above = int((all_p - p >= EPSILON).sum())
+    return above + int((np.abs(all_p - p) < EPSILON).sum()) // 2

@@ -1,0 +1,126 @@
+"""Smoothings by name: a discount, fitted to the counts where it has to be, for interpolation or for back-off.
+
+Names without `-backoff` are interpolated. Their SRILM options stand in `SRILM_OPTIONS`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from placerec.errors import LanguageModelError
+from placerec.lm.count_statistics import (
+    counts_of_counts,
+    kneser_ney_discount,
+    left_neighbour_counts,
+    modified_kneser_ney_discounts,
+)
+from placerec.lm.counts import Mask, NgramCounts
+from placerec.lm.discounts import Discount, absolute, additive, lidstone, modified_kneser_ney, witten_bell
+
+T = TypeVar("T")
+
+# What an order's counts and discount become: (counts, order, words that are predicted) -> (counts, discount).
+Fit = Callable[[NgramCounts, int, Mask], tuple[NgramCounts, Discount]]
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """How discounts are found, and whether they are used for interpolation or for back-off."""
+
+    name: str
+    fit: Fit
+    interpolate: bool
+
+
+def smoothing(name: str, delta: float | None = None) -> Smoothing:
+    """The smoothing of that name (SMOOTHINGS lists them).
+
+    `delta`: what the lidstone ones add to every count (default 1, above 0), or what the absolute ones take off
+    (default 0.5, above 0 and at most 1). Raises LanguageModelError for an unknown name, or a delta that leaves unseen
+    words without probability.
+    """
+    if name not in SMOOTHINGS:
+        raise LanguageModelError(f"smoothing {name!r} is unknown; choose one of {', '.join(SMOOTHINGS)}")
+    base = name.removesuffix("-backoff")
+    delta = default_delta(name) if delta is None else delta
+    if not 0 < delta < float("inf") or (base == "absolute" and delta > 1):
+        bounds = "above 0 and at most 1" if base == "absolute" else "above 0"
+        raise LanguageModelError(f"delta {delta:g} must be a number {bounds}: it is what unseen words live on")
+    return Smoothing(name, _FITS[name](delta), name == base)
+
+
+def default_delta(name: str) -> float:
+    """The delta of a smoothing if none is given."""
+    return 0.5 if name.startswith("absolute") else 1.0
+
+
+def _fixed(discount: Discount) -> Fit:
+    return lambda counts, n, event: (counts, discount)
+
+
+def _kneser_ney(counts: NgramCounts, n: int, event: Mask) -> tuple[NgramCounts, Discount]:
+    """Kneser & Ney 1995: one discount an order, lower orders by numbers of left neighbours."""
+    counts, tally = _neighbours(counts, n, event)
+    return counts, absolute(_explained(n, tally, lambda: kneser_ney_discount(*tally[:2])))
+
+
+def _modified_kneser_ney(counts: NgramCounts, n: int, event: Mask) -> tuple[NgramCounts, Discount]:
+    """Chen & Goodman 1998: three discounts an order."""
+    counts, tally = _neighbours(counts, n, event)
+    discounts = _explained(n, tally, lambda: modified_kneser_ney_discounts(*tally))
+    if min(discounts) < 0:
+        shown = ", ".join(f"{discount:.3g}" for discount in discounts)
+        raise LanguageModelError(
+            f"modified Kneser-Ney fails at order {n}: its discounts come out as {shown}; {_REMEDY}"
+        )
+    return counts, modified_kneser_ney(*discounts)
+
+
+_REMEDY = "closed vocabularies of few words are like that; use witten-bell"
+
+
+def _neighbours(counts: NgramCounts, n: int, event: Mask) -> tuple[NgramCounts, list[int]]:
+    if n < counts.order:
+        counts = left_neighbour_counts(counts, n, event)
+    return counts, counts_of_counts(counts, n, 4, event, np.zeros(len(event), np.int64))[1:].tolist()
+
+
+def _explained(n: int, tally: list[int], compute: Callable[[], T]) -> T:
+    try:
+        return compute()
+    except LanguageModelError as error:
+        seen = ", ".join(f"n{k} = {number}" for k, number in enumerate(tally, start=1))
+        raise LanguageModelError(
+            f"Kneser-Ney fails at order {n}: it needs n-grams seen once, twice and more; there are {seen}; {_REMEDY}"
+        ) from error
+
+
+_FITS: dict[str, Callable[[float], Fit]] = {
+    "witten-bell": lambda delta: _fixed(witten_bell),
+    "witten-bell-backoff": lambda delta: _fixed(witten_bell),
+    "lidstone": lambda delta: _fixed(lidstone(delta)),
+    "lidstone-backoff": lambda delta: _fixed(additive(delta)),
+    "absolute": lambda delta: _fixed(absolute(delta)),
+    "absolute-backoff": lambda delta: _fixed(absolute(delta)),
+    "kneser-ney": lambda delta: _kneser_ney,
+    "kneser-ney-backoff": lambda delta: _kneser_ney,
+    "modified-kneser-ney": lambda delta: _modified_kneser_ney,
+    "modified-kneser-ney-backoff": lambda delta: _modified_kneser_ney,
+}
+SMOOTHINGS = tuple(_FITS)
+
+# The options of ngram-count that do the same; None: it cannot.
+SRILM_OPTIONS: dict[str, str | None] = {
+    "witten-bell": "-wbdiscount -interpolate",
+    "witten-bell-backoff": "-wbdiscount",
+    "lidstone": None,
+    "lidstone-backoff": "-addsmooth {delta:g}",
+    "absolute": "-cdiscount {delta:g} -interpolate",
+    "absolute-backoff": "-cdiscount {delta:g}",
+    "kneser-ney": "-ukndiscount -interpolate",
+    "kneser-ney-backoff": "-ukndiscount",
+    "modified-kneser-ney": "-kndiscount -interpolate",
+    "modified-kneser-ney-backoff": "-kndiscount",
+}

@@ -1,0 +1,59 @@
+"""add-ppls: the sum of the totals of several `ngram -ppl` outputs (section 13 of our SRILM specification)."""
+
+import math
+import re
+from collections.abc import Sequence
+
+from placerec.srilm.options import leading_float
+from placerec.srilm.streams import SrilmError, Streams, exit_status
+
+TOOL = "add-ppls"
+USAGE = "usage: {tool} [PPL ...]  (outputs of ngram -ppl; default: standard input)"
+LN10 = 2.30258509299404568402
+_NUMBER = r"(\S+)"
+_FIRST = re.compile(rf"file .*: {_NUMBER} sentences, {_NUMBER} words, {_NUMBER} OOVs\s*$")
+_SECOND = re.compile(rf"{_NUMBER} zeroprobs, logprob= {_NUMBER} ")
+
+
+@exit_status
+def add_ppls(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
+    """Add up the `file NAME:` blocks of all files and print their total; returns the exit status."""
+    if arguments and arguments[0] in ("-help", "-?", "--help", "-h"):
+        raise SrilmError(USAGE.format(tool=tool), 0)
+    sentences = words = unknown = zeroprobs = log10_p = 0.0
+    for name in arguments or ["-"]:
+        inside = False
+        for line in streams.lines(name):
+            if match := _FIRST.match(line):
+                sentences, words, unknown = (
+                    total + _number(more)
+                    for total, more in zip((sentences, words, unknown), match.groups(), strict=True)
+                )
+            elif inside and (match := _SECOND.match(line)):
+                zeroprobs += _number(match[1])
+                log10_p += _number(match[2])
+            inside = line.startswith("file ")
+    streams.print(f"file TOTAL: {_whole(sentences)} sentences, {_whole(words)} words, {_whole(unknown)} OOVs\n")
+    if words + sentences > 0:
+        scored = words - unknown - zeroprobs
+        streams.print(
+            f"{_whole(zeroprobs)} zeroprobs, logprob= {log10_p:g} ppl= {_perplexity(log10_p, scored + sentences)} "
+            f"ppl1= {_perplexity(log10_p, scored)}\n"
+        )
+    return 0
+
+
+def _number(text: str) -> float:
+    return leading_float(text) or 0.0
+
+
+def _whole(value: float) -> str:
+    """As C prints it with %d: cut at the point."""
+    return f"{math.trunc(value)}" if math.isfinite(value) else f"{value}"
+
+
+def _perplexity(log10_p: float, tokens: float) -> str:
+    if tokens <= 0:
+        return "undefined"
+    exponent = -log10_p / tokens * LN10
+    return f"{math.exp(exponent):g}" if exponent < 709 else "inf"

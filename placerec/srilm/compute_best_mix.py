@@ -1,0 +1,91 @@
+"""compute-best-mix: the weights of a mixture from several models' `ngram -debug 2 -ppl` outputs (section 13)."""
+
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from placerec.lm.mix_weights import Floats, best_mix
+from placerec.srilm.options import leading_float
+from placerec.srilm.streams import SrilmError, Streams, exit_status
+
+TOOL = "compute-best-mix"
+USAGE = 'usage: {tool} [lambda="L1 L2 ..."] [precision=P] PPL1 PPL2 ...  (outputs of ngram -debug 2 -ppl)'
+LN10 = 2.30258509299404568402
+# What stands for the logarithm of 0.
+_LOG_ZERO = -320.0
+# Beyond this, exp ends.
+_MOST = 709.0
+_TOKEN = re.compile(r"\tp\( .* \[ (\S+)(?: \*(\S+))? \](?: / \S+)?\s*$")
+
+
+@exit_status
+def compute_best_mix(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
+    """Find the weights, tell each step on stderr and the result on stdout; returns the exit status."""
+    settings = dict(argument.split("=", 1) for argument in arguments if re.match(r"(lambda|precision)=", argument))
+    names = [argument for argument in arguments if not re.match(r"(lambda|precision)=", argument)]
+    if not names or names[0] in ("-help", "-?", "--help", "-h"):
+        raise SrilmError(USAGE.format(tool=tool), 0 if names else 2)
+    precision = leading_float(settings.get("precision", "0.001"))
+    if precision is None or not precision > 0:
+        raise SrilmError(f"{tool}: precision={settings['precision']}: a number above 0 is needed", 2)
+    start = starting_weights(settings.get("lambda", "0.5"), len(names), tool)
+    log10_p, counts = _tokens(names, streams, tool)
+    known = (log10_p > _LOG_ZERO).any(axis=0)
+    log10_p, counts = log10_p[:, known], counts[known]
+    weights, steps = best_mix(np.exp(log10_p * LN10), start, precision, counts=counts)
+    total = float(counts.sum())
+    for number, step in enumerate(steps, start=1):
+        ppl = math.exp(min(-step.loglik / total, _MOST))
+        streams.say(f"iteration {number}, lambda = ({_shown(step.weights)}), ppl = {ppl:g}")
+    cumulative = np.cumsum(weights)
+    pairwise = np.divide(weights, cumulative, out=np.zeros_like(weights), where=cumulative > 0)
+    streams.print(f"{total:g} non-oov words, best lambda ({_shown(weights)})\n")
+    streams.print(f"pairwise cumulative lambda ({_shown(pairwise)})\n")
+    return 0
+
+
+def starting_weights(text: str, models: int, tool: str = TOOL) -> list[float]:
+    """The weights that `lambda=` names; what is left to 1 is shared by the other models."""
+    given = [leading_float(word) for word in text.split()][:models]
+    weights = [weight for weight in given if weight is not None and 0 <= weight <= 1]
+    left = 1 - sum(weights)
+    if len(weights) < len(given) or left < -1e-6:
+        raise SrilmError(f"{tool}: lambda={text}: numbers between 0 and 1 are needed that do not exceed 1 in sum", 2)
+    others = models - len(weights)
+    if not others:
+        total = sum(weights)
+        if not total:
+            raise SrilmError(f"{tool}: lambda={text}: not all weights may be 0", 2)
+        return [weight / total for weight in weights]
+    return weights + [max(0.0, left) / others] * others
+
+
+def _tokens(names: Sequence[str], streams: Streams, tool: str) -> tuple[Floats, Floats]:
+    """What each model gives each token, log10, float64 (M, T), and how often each occurs, (T,)."""
+    columns = []
+    for name in names:
+        found = [match for match in map(_TOKEN.match, streams.lines(name)) if match]
+        log10_p = [_log10(match[1]) for match in found]
+        columns.append((np.array(log10_p), np.array([_count(match[2]) for match in found])))
+        if len(found) != len(columns[0][0]):
+            raise SrilmError(
+                f"{tool}: {name} has {len(found)} word probabilities, {names[0]} has {len(columns[0][0])}; "
+                "all must come from ngram -debug 2 -ppl with the same text"
+            )
+    return np.array([log10_p for log10_p, _ in columns]).reshape(len(names), -1), columns[0][1]
+
+
+def _log10(text: str) -> float:
+    value = leading_float(text)
+    return min(max(_LOG_ZERO, value), -_LOG_ZERO / 2) if value is not None and not math.isnan(value) else _LOG_ZERO
+
+
+def _count(text: str | None) -> float:
+    value = leading_float(text) if text else None
+    return value if value is not None and 0 <= value < math.inf else 1.0
+
+
+def _shown(weights: Floats) -> str:
+    return " ".join(f"{weight:g}" for weight in weights.tolist())

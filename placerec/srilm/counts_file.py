@@ -1,0 +1,110 @@
+"""Counts files: section 4.2 of our SRILM specification."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from placerec.lm.counts import NgramCounts, tabulate
+from placerec.srilm.options import leading_float
+from placerec.srilm.streams import Streams, tokens
+from placerec.srilm.vocabulary import WordList
+
+MOST_TOKENS = 100
+MALFORMED = "malformed N-gram count or more than 100 words per line"
+
+
+def parse_count(text: str, fractional: bool, *, most: int = 2**63 - 1) -> float | None:
+    """The count at the start of a text, as C's scanf reads it (%lu or %lf); None if there is none."""
+    if fractional:
+        return leading_float(text)
+    match = re.match(r"\+?(\d+)", text)
+    # SRILM's integers end at 2^64 - 1, numpy's at 2^63 - 1.
+    return min(int(match[1]), most) if match else None
+
+
+@dataclass
+class Table:
+    """N-grams as SRILM's word numbers, with their counts, in the order of the file."""
+
+    ngrams: list[list[int]] = field(default_factory=list)
+    counts: list[float] = field(default_factory=list)
+
+    def add(self, ngram: list[int], count: float) -> None:
+        """One more n-gram."""
+        self.ngrams.append(ngram)
+        self.counts.append(count)
+
+    def emptied(self) -> "Table":
+        """The same n-grams, each with count 0."""
+        return Table(self.ngrams, [0.0] * len(self.ngrams))
+
+    def within(self, other: "Table") -> "Table":
+        """The n-grams that `other` holds too, as n-gram or as the beginning of one."""
+        held = {tuple(ngram[:n]) for ngram in other.ngrams for n in range(1, len(ngram) + 1)}
+        kept = [i for i, ngram in enumerate(self.ngrams) if tuple(ngram) in held]
+        return Table([self.ngrams[i] for i in kept], [self.counts[i] for i in kept])
+
+    def at_least(self, minima: Sequence[float], words: WordList) -> "Table":
+        """The n-grams seen as often as the minimum of their order; the others become counts of counts per prefix.
+
+        That is what -read-with-mincounts does, with a meta tag; without one they are left out.
+        """
+        table = Table()
+        dropped: dict[tuple[int, ...], dict[int, int]] = {}
+        kept: set[tuple[int, ...]] = set()
+        for ngram, count in zip(self.ngrams, self.counts, strict=True):
+            if count < int(minima[min(len(ngram), len(minima)) - 1]):
+                tally = dropped.setdefault(tuple(ngram[:-1]), {})
+                tally[int(count)] = tally.get(int(count), 0) + 1
+            else:
+                table.add(ngram, count)
+                kept.add(tuple(ngram[:-1]))
+        if words.meta_tag is not None:
+            for prefix, tally in dropped.items():
+                if prefix in kept:
+                    for count, times in sorted(tally.items()):
+                        table.add([*prefix, words.add(f"{words.meta_tag}{count}")], times)
+        return table
+
+    def count(self, order: int, words: WordList, *, fractional: bool) -> NgramCounts:
+        """The sums over the sorted vocabulary."""
+        vocabulary, renumbered = words.sorted()
+        sorted_number = np.array(renumbered, np.int64)
+        dtype = np.float64 if fractional else np.int64
+        groups, values = [], []
+        for n in range(1, order + 1):
+            which = [i for i, ngram in enumerate(self.ngrams) if len(ngram) == n]
+            numbers = np.array([self.ngrams[i] for i in which], np.int64).reshape(len(which), n)
+            groups.append(sorted_number[numbers])
+            values.append(np.array([self.counts[i] for i in which], dtype))
+        return tabulate(vocabulary, order, groups, values)
+
+
+def count_lines(
+    name: str, fractional: bool, streams: Streams, *, most: int = 2**63 - 1
+) -> Iterator[tuple[list[str], float]]:
+    """The n-grams of a counts file and their counts, at most `most`; a malformed line is reported and ends the file."""
+    lines = streams.lines(name)
+    for line in lines:
+        found = tokens(line)
+        count = parse_count(found[-1], fractional, most=most) if 2 <= len(found) <= MOST_TOKENS else None
+        if count is None:
+            streams.say(f"{lines.position}{MALFORMED}")
+            return
+        yield found[:-1], count
+
+
+def read_counts(
+    name: str, order: int, words: WordList, streams: Streams, *, fractional: bool, limited: bool = False
+) -> Table:
+    """The n-grams up to `order` of a counts file; with `limited`, those with a word that is not listed are left out."""
+    table = Table()
+    for ngram, count in count_lines(name, fractional, streams):
+        if len(ngram) > order:
+            continue
+        if limited and any(words.normal(word) not in words.index for word in ngram):
+            continue
+        table.add([words.number(word) for word in ngram], count)
+    return table

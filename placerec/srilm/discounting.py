@@ -1,0 +1,251 @@
+"""Which discount each order gets, from options, counts and parameter files: section 5 of our SRILM specification."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from placerec.errors import LanguageModelError
+from placerec.lm.count_statistics import (
+    counts_of_counts,
+    good_turing_factors,
+    kneser_ney_discount,
+    left_neighbour_counts,
+    modified_kneser_ney_discounts,
+)
+from placerec.lm.counts import Mask, NgramCounts
+from placerec.lm.discounts import (
+    Discount,
+    Rule,
+    absolute,
+    additive,
+    good_turing,
+    modified_kneser_ney,
+    natural,
+    witten_bell,
+)
+from placerec.lm.trie import Ints
+from placerec.srilm.options import Parsed, leading_float, leading_int
+from placerec.srilm.streams import SrilmError, Streams, tokens
+
+# In the order in which an order without a method of its own inherits the general one.
+METHODS = ("ndiscount", "wbdiscount", "cdiscount", "addsmooth", "ukndiscount", "kndiscount")
+NAMES = {
+    "ndiscount": "NaturalDiscount",
+    "wbdiscount": "WittenBell",
+    "cdiscount": "ConstDiscount",
+    "addsmooth": "AddSmooth",
+    "ukndiscount": "KneserNey",
+    "kndiscount": "ModKneserNey",
+    "gt": "GoodTuring",
+}
+MOST_NUMBERED = 9
+MODIFYING = "modifying {}-gram counts for Kneser-Ney smoothing"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The method of an order, the number that goes with it, its parameter file, counts' bounds, interpolation."""
+
+    method: str
+    value: float
+    file: str | None
+    minimum: float
+    maximum: int
+    interpolate: bool
+
+
+def given_method(options: Parsed, suffix: str) -> tuple[str | None, int]:
+    """The method that the options with this suffix ("" or an order) ask for, and how many different ones they name."""
+    named = [name for name in METHODS[:-1] if name + suffix in options.given]
+    if options["kndiscount" + suffix] or options["kn" + suffix]:
+        named.append("kndiscount")
+    if options["gt" + suffix]:
+        named.append("gt")
+    if "ukndiscount" in named and "kndiscount" in named and not options["kndiscount" + suffix]:
+        # A file beside -ukndiscount is that method's own.
+        named.remove("kndiscount")
+    return (named[0] if named else None), len(named)
+
+
+def choose(options: Parsed, n: int, *, model_wanted: bool) -> Choice | None:
+    """The choice for order n; None for no discounting. SrilmError (status 2) for conflicting options."""
+    suffix = str(n) if n <= MOST_NUMBERED else ""
+    method, many = given_method(options, suffix) if suffix else (None, 0)
+    if many > 1:
+        raise SrilmError(f"conflicting discounting options for order {n}", 2)
+    source = suffix
+    if method is None:
+        method, _ = given_method(options, "")
+        source = ""
+    if method is None:
+        if not model_wanted:
+            return None
+        method = "gt"
+    value = options[method + source] if method in ("cdiscount", "addsmooth") else 0.0
+    file = (
+        options[("gt" if method == "gt" else "kn") + source] if method in ("gt", "kndiscount", "ukndiscount") else None
+    )
+    minimum = options[f"gt{n}min"] if suffix else options["gtmin"]
+    maximum = options[f"gt{n}max"] if suffix else options["gtmax"]
+    interpolate = options["interpolate"] or bool(suffix and options["interpolate" + suffix])
+    if method in ("gt", "ukndiscount", "kndiscount"):
+        minimum = float(math.trunc(minimum))
+    return Choice(method, value, file, minimum, maximum, interpolate)
+
+
+@dataclass
+class Fitter:
+    """Fits the discounts of all orders in turn; the Kneser-Ney methods change the lower orders of `counts`.
+
+    `event` bool (V,): words that are predicted; `meta` int64 (V,): k where a word stands for k occurrences.
+    """
+
+    counts: NgramCounts
+    event: Mask
+    meta: Ints
+    options: Parsed
+    streams: Streams
+    debug: int
+    fractional: bool
+    modified: set[int] = field(default_factory=set)
+    late: set[int] = field(default_factory=set)
+
+    def rule(self, n: int, choice: Choice, *, read: bool) -> Rule:
+        """The rule of order n; with `read`, parameters come from the file. SrilmError if it cannot be fitted."""
+        if self.debug:
+            self.streams.say(f"using {NAMES[choice.method]} for {n}-grams")
+        try:
+            return self._rule(n, choice, read)
+        except LanguageModelError as error:
+            if str(error):
+                self.streams.say(str(error))
+            raise SrilmError(f"error in discount estimator for order {n}") from error
+
+    def _rule(self, n: int, choice: Choice, read: bool) -> Rule:
+        bounded = choice.minimum <= 1
+        match choice.method:
+            case "wbdiscount":
+                return Rule(witten_bell, choice.interpolate, choice.minimum)
+            case "cdiscount":
+                discount = min(1.0, max(0.0, choice.value))
+                return Rule(absolute(discount), choice.interpolate, choice.minimum, not (bounded and discount == 0))
+            case "addsmooth":
+                delta = max(0.0, choice.value)
+                return Rule(additive(delta), choice.interpolate, choice.minimum, not (bounded and delta == 0))
+            case "ndiscount":
+                if self.fractional:
+                    raise LanguageModelError("")
+                return Rule(natural, choice.interpolate, choice.minimum)
+        if choice.file and read:
+            if choice.method != "gt":
+                self.late.add(n)
+            return self._read(choice)
+        if self.fractional:
+            raise LanguageModelError("discounting method does not support float counts")
+        if choice.method == "gt":
+            return self._good_turing(n, choice)
+        return self._kneser_ney(n, choice)
+
+    def _good_turing(self, n: int, choice: Choice) -> Rule:
+        top = max(0, choice.maximum)
+        tally = counts_of_counts(self.counts, n, top + 1, self.event, self.meta)
+        if self.debug:
+            self.streams.say(f"Good-Turing discounting {n}-grams")
+            for k, number in enumerate(tally.tolist()):
+                self.streams.say(f"GT-count [{k}] = {number}")
+        factors, warnings = good_turing_factors(tally, top)
+        for warning in warnings:
+            self.streams.say(warning)
+        if choice.file:
+            lines = [f"mincount {int(choice.minimum)}", f"maxcount {len(factors) - 1 if factors else 0}"]
+            lines += [f"discount {k} {factor:.16g}" for k, factor in enumerate(factors or [1.0]) if k]
+            self.streams.write(choice.file, "".join(f"{line}\n" for line in lines))
+        return _good_turing_rule(factors, choice.minimum, choice.interpolate)
+
+    def _kneser_ney(self, n: int, choice: Choice) -> Rule:
+        late = self.options["kn-modify-counts-at-end"]
+        if not late:
+            self.prepare(n)
+        modified = choice.method == "kndiscount"
+        numbers = counts_of_counts(self.counts, n, 4, self.event, self.meta)[1:].tolist()
+        if self.debug:
+            self.streams.say(f"Kneser-Ney smoothing {n}-grams")
+            for k, number in enumerate(numbers[: 4 if modified else 2], start=1):
+                self.streams.say(f"n{k} = {number}")
+        discounts: Sequence[float]
+        discounts = modified_kneser_ney_discounts(*numbers) if modified else [kneser_ney_discount(*numbers[:2])]
+        if self.debug:
+            names = ("D1", "D2", "D3+") if modified else ("D",)
+            for name, discount in zip(names, discounts, strict=True):
+                self.streams.say(f"{name} = {discount:.6g}")
+        if min(discounts) < 0:
+            raise LanguageModelError("one of modified KneserNey discounts is negative")
+        if choice.file:
+            self.streams.write(choice.file, _kneser_ney_file(int(choice.minimum), discounts))
+        if late:
+            self.prepare(n)
+        return _kneser_ney_rule(discounts, choice.minimum, choice.interpolate)
+
+    def prepare(self, n: int, *, silent: bool = False) -> bool:
+        """Step A of section 5.3, once for each order below the highest; whether there was something to do."""
+        if n >= self.counts.order or n in self.modified or self.options["kn-counts-modified"]:
+            return False
+        if self.debug and not silent:
+            self.streams.say(MODIFYING.format(n))
+        self.counts = left_neighbour_counts(self.counts, n, self.event)
+        self.modified.add(n)
+        return True
+
+    def prepare_late(self) -> list[int]:
+        """Step A for the orders whose parameters were read: SRILM does it when estimation comes to them."""
+        return [n for n in sorted(self.late) if self.prepare(n, silent=True)]
+
+    def _read(self, choice: Choice) -> Rule:
+        """The rule that a parameter file gives; its mincount overrides the option."""
+        numbers = _parameters(choice.file or "", self.streams)
+        minimum = float(numbers.get("mincount", choice.minimum))
+        if choice.method == "gt":
+            top = int(numbers.get("maxcount", 0))
+            factors = [1.0, *(float(numbers.get(f"discount {k}", 1.0)) for k in range(1, top + 1))]
+            return _good_turing_rule(factors if top > 0 else None, minimum, choice.interpolate)
+        names = ("discount1", "discount2", "discount3+") if choice.method == "kndiscount" else ("discount1",)
+        return _kneser_ney_rule(tuple(float(numbers.get(name, 0.0)) for name in names), minimum, choice.interpolate)
+
+
+def _good_turing_rule(factors: Sequence[float] | None, minimum: float, interpolate: bool) -> Rule:
+    if factors is None:
+        return Rule(good_turing([1.0]), interpolate, minimum, exhaustible=minimum > 1)
+    return Rule(good_turing(factors), interpolate, minimum)
+
+
+def _kneser_ney_rule(discounts: Sequence[float], minimum: float, interpolate: bool) -> Rule:
+    rule: Discount = absolute(discounts[0]) if len(discounts) == 1 else modified_kneser_ney(*discounts)
+    return Rule(rule, interpolate, minimum)
+
+
+def _kneser_ney_file(minimum: int, discounts: Sequence[float]) -> str:
+    if len(discounts) == 1:
+        return f"mincount {minimum}\ndiscount1 {discounts[0]:.16g}\n"
+    lines = [
+        f"{name} {value:.16f}\n"
+        for name, value in zip(("discount1", "discount2", "discount3+"), discounts, strict=True)
+    ]
+    return f"mincount {minimum}\n" + "".join(lines)
+
+
+def _parameters(name: str, streams: Streams) -> Mapping[str, float]:
+    numbers: dict[str, float] = {}
+    for line in streams.lines(name):
+        *key, text = tokens(line)
+        value = leading_float(text)
+        if key and value is not None:
+            numbers[" ".join(key)] = value
+    return numbers
+
+
+def meta_occurrences(words: Sequence[str], tag: str | None) -> Ints:
+    """k for a word `TAGk`, 0 for any other, int64 (V,)."""
+    found = [leading_int(word[len(tag) :]) if tag is not None and word.startswith(tag) else 0 for word in words]
+    return np.array([k or 0 for k in found], np.int64)

@@ -1,0 +1,232 @@
+"""`ngram-count`: text and counts in, counts, vocabularies and language models out (sections 2 to 7)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from placerec.lm.arpa import arpa_blocks
+from placerec.lm.count_statistics import recomputed
+from placerec.lm.counts import NgramCounts, add_counts, format_counts
+from placerec.lm.discounts import Rule
+from placerec.lm.draft import insert_prefixes
+from placerec.lm.estimate import estimate_draft
+from placerec.lm.prune import prune
+from placerec.srilm.counts_file import Table, read_counts
+from placerec.srilm.discounting import MODIFYING, Fitter, choose, given_method, meta_occurrences
+from placerec.srilm.estimation_messages import EstimationMessages
+from placerec.srilm.first_seen import FirstSeen
+from placerec.srilm.options import Option, Options, Parsed, parse
+from placerec.srilm.streams import SrilmError, Streams
+from placerec.srilm.text import Marking, Text, read_text
+from placerec.srilm.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
+
+TOOL = "ngram-count"
+
+
+def _method_options() -> dict[str, Option]:
+    options: dict[str, Option] = {}
+    for suffix in ("", *map(str, range(1, 10))):
+        which = f"order {suffix}" if suffix else "all orders"
+        options["ndiscount" + suffix] = Option("flag", False, f"natural discounting, {which}")
+        options["wbdiscount" + suffix] = Option("flag", False, f"Witten-Bell discounting, {which}")
+        options["cdiscount" + suffix] = Option("float", -1.0, f"absolute discounting by this much, {which}")
+        options["addsmooth" + suffix] = Option("float", -1.0, f"add this much to counts, {which}")
+        options["ukndiscount" + suffix] = Option("flag", False, f"original Kneser-Ney discounting, {which}")
+        options["kndiscount" + suffix] = Option("flag", False, f"modified Kneser-Ney discounting, {which}")
+        options["kn" + suffix] = Option("string", None, f"Kneser-Ney parameter file, {which}")
+        options["gt" + suffix] = Option("string", None, f"Good-Turing parameter file, {which}")
+        options["interpolate" + suffix] = Option("flag", False, f"interpolate with the shorter context, {which}")
+        higher = suffix or "above 9"
+        low = 2.0 if suffix and int(suffix) > 2 else 1.0
+        top = {"": 5, "1": 1}.get(suffix, 7)
+        options[f"gt{suffix}min"] = Option("float", low, f"leave out n-grams seen less often, order {higher}")
+        options[f"gt{suffix}max"] = Option("int", top, f"largest count that Good-Turing discounts, order {higher}")
+        if suffix:
+            options["write" + suffix] = Option("string", None, f"write the counts of {which}")
+    return options
+
+
+OPTIONS: Options = {
+    "order": Option("unsigned", 3, "largest n-gram length"),
+    "debug": Option("int", 0, "how much to say"),
+    "text": Option("string", None, "text to count"),
+    "text-has-weights": Option("flag", False, "lines begin with a weight"),
+    "text-has-weights-last": Option("flag", False, "lines end with a weight"),
+    "no-sos": Option("flag", False, "do not put <s> in front of lines"),
+    "no-eos": Option("flag", False, "do not put </s> behind lines"),
+    "read": Option("string", None, "counts to read"),
+    "intersect": Option("string", None, "count only the n-grams of this counts file"),
+    "read-with-mincounts": Option("flag", False, "apply minimum counts while reading"),
+    "float-counts": Option("flag", False, "counts are real numbers"),
+    "recompute": Option("flag", False, "make shorter counts from longer ones"),
+    "meta-tag": Option("string", None, "words with this start are counts of counts"),
+    "trust-totals": Option("flag", False, "take contexts' counts for their totals"),
+    "vocab": Option("string", None, "the words; others become <unk>"),
+    "vocab-aliases": Option("string", None, "other names of words"),
+    "nonevents": Option("string", None, "words that are never predicted"),
+    "limit-vocab": Option("flag", False, "leave out n-grams with other words while reading counts"),
+    "unk": Option("flag", False, "<unk> is a word like others"),
+    "map-unk": Option("string", None, "the word to use for <unk>"),
+    "tolower": Option("flag", False, "A to Z become a to z"),
+    "lm": Option("string", None, "write a language model"),
+    "write": Option("string", None, "write counts"),
+    "write-order": Option("unsigned", 0, "length of the n-grams that -write writes (0: all)"),
+    "sort": Option("flag", False, "sort what is written"),
+    "write-vocab": Option("string", None, "write all words"),
+    "write-vocab-index": Option("string", None, "write all words with their numbers"),
+    "write-text": Option("string", None, "copy the text instead of counting it"),
+    "prune": Option("float", 0.0, "leave out n-grams that change perplexity by less"),
+    "minprune": Option("unsigned", 2, "shortest n-grams to prune"),
+    "kn-counts-modified": Option("flag", False, "the counts are Kneser-Ney's already"),
+    "kn-modify-counts-at-end": Option("flag", False, "change counts after the discounts are estimated"),
+    **_method_options(),
+    "read-google": Option("string", None, "counts in Google's folders are not specified", refused=True),
+    "skip": Option("flag", False, "skip n-gram models are not specified", refused=True),
+    "varprune": Option("float", 0.0, "variance pruning is not specified", refused=True),
+}
+
+
+def ngram_count(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
+    """Run `ngram-count` with these arguments; returns the exit status."""
+    try:
+        options = parse(tool, OPTIONS, arguments, streams)
+        _run(options, streams)
+    except SrilmError as error:
+        streams.say(str(error))
+        return error.status
+    return 0
+
+
+def _run(options: Parsed, streams: Streams) -> None:
+    if given_method(options, "")[1] > 1:
+        raise SrilmError("conflicting default discounting options", 2)
+    words = _read_vocabulary(options, streams)
+    counts, first = _read_all(options, words, streams)
+    fitter = _fitter(options, counts, words, streams)
+    rules = []
+    wanted = options["lm"] is not None
+    for n in range(1, max(1, options["order"]) + 1):
+        choice = choose(options, n, model_wanted=wanted)
+        rules.append(fitter.rule(n, choice, read=wanted) if choice else Rule())
+    if wanted:
+        _write_model(options, fitter, rules, words, first, streams)
+    _write_rest(options, fitter.counts, words, first, streams)
+
+
+def _read_vocabulary(options: Parsed, streams: Streams) -> WordList:
+    words = WordList(lower=options["tolower"], open_unknown=options["unk"], meta_tag=options["meta-tag"])
+    if options["map-unk"]:
+        words.map_unknown(options["map-unk"])
+    if options["vocab"]:
+        read_words(words, options["vocab"], streams)
+        words.closed = True
+    if options["vocab-aliases"]:
+        read_aliases(words, options["vocab-aliases"], streams)
+    if options["nonevents"]:
+        read_words(words, options["nonevents"], streams, silent=True)
+    return words
+
+
+def _read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[NgramCounts, FirstSeen]:
+    """All counts, and what tells the order in which n-grams were first seen."""
+    order, fractional = options["order"], options["float-counts"]
+    tables: list[Table] = []
+    only = None
+    if options["intersect"]:
+        only = read_counts(options["intersect"], order, words, streams, fractional=fractional)
+        tables.append(only.emptied())
+    if options["read"]:
+        limited = options["limit-vocab"]
+        table = read_counts(options["read"], order, words, streams, fractional=fractional, limited=limited)
+        if options["read-with-mincounts"]:
+            table = table.at_least([options[f"gt{n}min"] for n in range(1, 10)], words)
+        tables.append(table.within(only) if only else table)
+    text = None
+    if options["text"] and options["write-text"]:
+        streams.write(options["write-text"], "".join(f"{line}\n" for line in streams.lines(options["text"])))
+    elif options["text"]:
+        text = _read_text(options, words, streams)
+    parts = [table.count(max(1, order), words, fractional=fractional) for table in tables]
+    if text is not None and order > 0:
+        parts.append(text.count(order, words, fractional=fractional))
+    if not parts:
+        parts.append(Table().count(max(1, order), words, fractional=fractional))
+    counts = parts[0] if len(parts) == 1 else add_counts(*parts)
+    if options["recompute"]:
+        counts = recomputed(counts)
+    return counts, FirstSeen(tables, text, words)
+
+
+def _read_text(options: Parsed, words: WordList, streams: Streams) -> Text:
+    weight = "last" if options["text-has-weights-last"] else "first" if options["text-has-weights"] else ""
+    marking = Marking(not options["no-sos"], not options["no-eos"], weight, options["float-counts"])
+    text = read_text(options["text"], words, marking, streams)
+    if options["debug"] >= 1:
+        sentences = len(text.lengths)
+        streams.say(
+            f"{options['text']}: line {text.lines}: {sentences} sentences, {text.words} words, {text.unknown} OOVs"
+        )
+        if text.words + sentences > 0:
+            streams.say("0 zeroprobs, logprob= 0 ppl= 1 ppl1= " + ("1" if text.words else "undefined"))
+    return text
+
+
+def _fitter(options: Parsed, counts: NgramCounts, words: WordList, streams: Streams) -> Fitter:
+    vocabulary = counts.trie.vocabulary
+    meta = meta_occurrences(vocabulary.words, options["meta-tag"])
+    event = ~vocabulary.mask(words.non_events) & ~np.array([words.is_meta(word) for word in vocabulary.words], bool)
+    return Fitter(counts, event, meta, options, streams, options["debug"], options["float-counts"])
+
+
+def _write_model(
+    options: Parsed, fitter: Fitter, rules: Sequence[Rule], words: WordList, first: FirstSeen, streams: Streams
+) -> None:
+    if options["order"] < 1:
+        streams.say("LM order must be positive -- set to 1")
+    late = fitter.prepare_late()
+    announced = {n: MODIFYING.format(n) for n in late}
+    trace = EstimationMessages(fitter.counts, first, streams, options["debug"], announced=announced)
+    draft = estimate_draft(
+        fitter.counts,
+        rules,
+        non_events=words.non_events,
+        open_vocabulary=words.open_unknown,
+        unknown=words.unknown,
+        meta_tag=options["meta-tag"],
+        trust_totals=options["trust-totals"],
+        names=np.array(words.names(fitter.counts.trie.vocabulary), np.int64),
+        trace=trace,
+    )
+    insert_prefixes(draft, trace)
+    if options["prune"] > 0:
+        prune(draft, options["prune"], shortest=options["minprune"], trace=trace)
+    model = draft.model()
+    if options["debug"] >= 1:
+        for n, keys in enumerate(model.trie.keys, start=1):
+            streams.say(f"writing {len(keys)} {n}-grams")
+    with streams.output(options["lm"]) as file:
+        file.writelines(arpa_blocks(model, encoding="latin-1"))
+
+
+def _write_rest(options: Parsed, counts: NgramCounts, words: WordList, first: FirstSeen, streams: Streams) -> None:
+    """Vocabularies and counts, in SRILM's order; counts on standard output if nothing else is written."""
+    number = "%.16g" if options["float-counts"] else "%d"
+
+    def show(only: int | None) -> str:
+        if options["sort"]:
+            return format_counts(counts, only=only, count=number)
+        return first.format(counts, only=only, count=number)
+
+    if options["write-vocab"]:
+        streams.write(options["write-vocab"], format_words(words))
+    if options["write-vocab-index"]:
+        streams.write(options["write-vocab-index"], format_indices(words))
+    orders = [n for n in range(1, 10) if options[f"write{n}"]]
+    for n in orders:
+        streams.write(options[f"write{n}"], show(n) if n <= counts.order else "")
+    files = [name for name in options.given if name.startswith(("kn", "gt")) and name[2:] in ("", *"123456789")]
+    silent = orders or files or any(options[name] for name in ("lm", "write-vocab", "write-vocab-index", "write-text"))
+    target = options["write"] or (None if silent else "-")
+    if target:
+        only = options["write-order"] or None
+        streams.write(target, show(only) if only is None or only <= counts.order else "")

@@ -1,0 +1,234 @@
+"""Files and talk as SRILM has them: section 2.2 of our SRILM specification.
+
+Text is handled as bytes kept in str (Latin-1), so that no byte is lost and words sort by their bytes.
+"""
+
+import os
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property, wraps
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, TypeVar, cast
+
+from placerec.errors import PlacerecError
+
+SPACES = " \t\n\v\f\r"
+_BLANKS = str.maketrans("\t\r\n", "   ")
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_OTHER_MARKS = {b"\xff\xfe": "UTF-16LE", b"\xfe\xff": "UTF-16BE"}
+# Suffix -> what packed files begin with.
+_PACKERS = {".gz": b"\x1f\x8b", ".bz2": b"BZh"}
+_OTHER_PACKERS = (".Z", ".z", ".7z", ".xz")
+_Tool = TypeVar("_Tool", bound=Callable[..., int])
+
+
+class SrilmError(PlacerecError):
+    """A message that ends the run with `status`."""
+
+    def __init__(self, message: str, status: int = 1) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+@dataclass
+class Streams:
+    """Standard input, output and error of one run, and whether `-` was read or written before."""
+
+    stdin: BinaryIO
+    stdout: BinaryIO
+    stderr: BinaryIO
+    used: set[str] = field(default_factory=set)
+
+    def say(self, message: str) -> None:
+        """A line on standard error, at once."""
+        self.stderr.write(message.encode("latin-1", "replace") + b"\n")
+        self.stderr.flush()
+
+    def print(self, text: str) -> None:
+        """Text on standard output."""
+        self.stdout.write(text.encode("latin-1"))
+
+    def open(self, name: str) -> BinaryIO:
+        """A file to read (`-`: standard input), unpacked where it is packed; SrilmError if there is none."""
+        if name == "-":
+            self._once("input")
+            return self.stdin
+        with _named(name):
+            path = _path(name)
+            suffix = _packing(name)
+            if not suffix or (path.is_file() and not _is_packed(path, suffix)):
+                return open(path, "rb")
+            return _unpacking(path, suffix)
+
+    def read(self, name: str) -> bytes:
+        """All bytes of a file, as `open` gives it."""
+        with _named(name), self.closing(self.open(name)) as file:
+            return file.read()
+
+    @contextmanager
+    def closing(self, file: BinaryIO) -> Iterator[BinaryIO]:
+        """Closes a file that `open` gave, unless it is standard input."""
+        try:
+            yield file
+        finally:
+            if file is not self.stdin:
+                file.close()
+
+    @contextmanager
+    def output(self, name: str) -> Iterator[BinaryIO]:
+        """A file to write to (`-`: standard output), packed by its suffix; it appears when it is whole."""
+        if name == "-":
+            self._once("output")
+            yield self.stdout
+            return
+        with _named(name), ExitStack() as stack:
+            path = _path(name).resolve()
+            suffix = _packing(name)
+            # A device or a pipe has to be written itself; so has a file in a folder that takes no other.
+            direct = path.exists() and not (path.is_file() and os.access(path.parent, os.W_OK))
+            partial = path if direct else path.with_name(f".{path.name}.partial-{os.getpid()}")
+            file: BinaryIO = stack.enter_context(open(partial, "wb"))
+            if not direct:
+                stack.callback(partial.unlink, missing_ok=True)
+            if suffix:
+                with _packing_into(file, suffix) as packed:
+                    yield packed
+            else:
+                yield file
+            file.close()
+            if not direct:
+                partial.replace(path)
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file whole, as `output` does."""
+        with self.output(name) as file:
+            file.write(text.encode("latin-1"))
+
+    def _once(self, what: str) -> None:
+        if what in self.used and what + "!" not in self.used:
+            self.say(f"warning: '-' used multiple times for {what}")
+            self.used.add(what + "!")
+        self.used.add(what)
+
+    def lines(self, name: str) -> "Lines":
+        """The lines of a file that are neither blank nor comments."""
+        return Lines(name, self.open(name), self)
+
+
+class Lines:
+    """Iterates over the lines of a file that are neither blank nor comments; `number` is that of the last line read.
+
+    A line is read when it is asked for. `data` is the whole file, for those who take it apart themselves.
+    """
+
+    def __init__(self, name: str, source: BinaryIO, streams: Streams) -> None:
+        self.name = name
+        self.number = 0
+        self.source = source
+        self.streams = streams
+
+    @cached_property
+    def data(self) -> bytes:
+        """All bytes, without a byte-order mark."""
+        with _named(self.name), self.streams.closing(self.source):
+            return self._unmarked(self.source.read())
+
+    def _unmarked(self, start: bytes) -> bytes:
+        encoding = _OTHER_MARKS.get(start[:2])
+        if encoding:
+            self.streams.say(f"{self.name}: line 0: conversion from {encoding} not supported")
+            return b""
+        return start.removeprefix(_BYTE_ORDER_MARK)
+
+    def _physical(self) -> Iterator[bytes]:
+        if "data" in self.__dict__:
+            yield from BytesIO(self.data)
+            return
+        first = self._unmarked(self.source.readline())
+        if first:
+            yield first
+            yield from self.source
+
+    def __iter__(self) -> Iterator[str]:
+        with _named(self.name), self.streams.closing(self.source):
+            begun = ""
+            for physical in self._physical():
+                self.number += 1
+                line = physical.decode("latin-1").removesuffix("\n")
+                if "\0" in line:
+                    # What follows a NUL byte is lost, the line end with it.
+                    begun += line.partition("\0")[0]
+                    continue
+                whole, begun = begun + line, ""
+                if whole.strip(SPACES) and not whole.startswith("##"):
+                    yield whole
+            if begun.strip(SPACES) and not begun.startswith("##"):
+                yield begun
+
+    @property
+    def position(self) -> str:
+        """What messages about the last line start with."""
+        return f"{self.name}: line {self.number}: "
+
+
+def tokens(line: str) -> list[str]:
+    """The words of a line: blank, tab, CR and LF separate them; vertical tab and form feed do not."""
+    return [word for word in line.translate(_BLANKS).split(" ") if word]
+
+
+def exit_status(tool: _Tool) -> _Tool:
+    """A tool (arguments, streams, ...) that ends with a message and its status where `tool` raises SrilmError."""
+
+    @wraps(tool)
+    def run(arguments: Sequence[str], streams: Streams, *others: str) -> int:
+        try:
+            return tool(arguments, streams, *others)
+        except SrilmError as error:
+            streams.say(str(error))
+            return error.status
+
+    return cast(_Tool, run)
+
+
+def _path(name: str) -> Path:
+    return Path(os.fsdecode(name.encode("latin-1")))
+
+
+def _packing(name: str) -> str:
+    """The suffix by which a file is packed, an empty text if it is not."""
+    suffix = name[name.rfind(".") :] if "." in name[1:] else ""
+    if suffix in _OTHER_PACKERS:
+        raise SrilmError(f"{name}: placerec does not read or write {suffix} files; use .gz or .bz2", 2)
+    return suffix if suffix in _PACKERS else ""
+
+
+@contextmanager
+def _named(name: str) -> Iterator[None]:
+    """What goes wrong with a file becomes SrilmError with its name in front."""
+    try:
+        yield
+    except (OSError, EOFError, zlib.error) as error:
+        raise SrilmError(f"{name}: {getattr(error, 'strerror', None) or error}") from error
+
+
+def _is_packed(path: Path, suffix: str) -> bool:
+    with open(path, "rb") as file:
+        return file.read(len(_PACKERS[suffix])) == _PACKERS[suffix]
+
+
+def _unpacking(path: Path, suffix: str) -> BinaryIO:
+    from bz2 import BZ2File
+    from gzip import GzipFile
+
+    return cast(BinaryIO, GzipFile(path, "rb") if suffix == ".gz" else BZ2File(path, "rb"))
+
+
+def _packing_into(file: BinaryIO, suffix: str) -> BinaryIO:
+    from bz2 import BZ2File
+    from gzip import GzipFile
+
+    # Without name and time, so that the same text gives the same bytes.
+    return cast(BinaryIO, GzipFile("", "wb", 6, file, mtime=0) if suffix == ".gz" else BZ2File(file, "wb"))

@@ -1,0 +1,127 @@
+"""SRILM's vocabulary: words by number in order of first occurrence; section 3 of our SRILM specification."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.trie import Vocabulary
+from placerec.srilm.streams import Streams, tokens
+
+PAUSE = "-pau-"
+
+
+@dataclass
+class WordList:
+    """Names and their numbers; several names may have one number (aliases), a number may have lost its name.
+
+    `closed`: words that are not listed become the unknown word. `open_unknown`: the unknown word is a regular word
+    (-unk). `meta_tag`: words with this start are counts of counts.
+    """
+
+    lower: bool = False
+    closed: bool = False
+    open_unknown: bool = False
+    meta_tag: str | None = None
+    unknown: str = UNKNOWN
+    index: dict[str, int] = field(default_factory=dict)
+    words: list[str | None] = field(default_factory=list)
+    silent: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        for word in (UNKNOWN, SENTENCE_START, SENTENCE_END, PAUSE):
+            self.add(word)
+        self.silent |= {SENTENCE_START, PAUSE}
+
+    def normal(self, word: str) -> str:
+        """`word` in lower case (A to Z only) if that was asked for."""
+        return word.translate(_LOWER) if self.lower else word
+
+    def add(self, word: str) -> int:
+        """The number of a word, a new one if it is not listed."""
+        word = self.normal(word)
+        number = self.index.get(word)
+        if number is None:
+            number = len(self.words)
+            self.index[word] = number
+            self.words.append(word)
+        return number
+
+    def number(self, word: str) -> int:
+        """The number of a word of a text or counts file: added if the vocabulary is open, else the unknown word's."""
+        if not self.closed:
+            return self.add(word)
+        return self.index.get(self.normal(word), self.index[self.unknown])
+
+    def is_meta(self, word: str) -> bool:
+        return self.meta_tag is not None and word.startswith(self.meta_tag)
+
+    @property
+    def non_events(self) -> set[str]:
+        """The words that never get a probability."""
+        return self.silent | (set() if self.open_unknown else {self.unknown})
+
+    def map_unknown(self, word: str) -> None:
+        """`word` takes the place of <unk> (-map-unk)."""
+        word = self.normal(word)
+        old = self.index.pop(self.unknown)
+        number = self.index.get(word)
+        if number is None:
+            self.index[word] = old
+            self.words[old] = word
+        else:
+            self.words[old] = None
+        self.unknown = word
+
+    def alias(self, name: str, word: str) -> None:
+        """`name` is another name of `word`; a former word of that name is lost."""
+        name = self.normal(name)
+        number = self.add(word)
+        former = self.index.get(name)
+        if former is not None and former != number and self.words[former] == name:
+            self.words[former] = None
+        self.index[name] = number
+
+    def names(self, vocabulary: Vocabulary) -> list[int]:
+        """How many names each word of the sorted vocabulary has."""
+        count = Counter(self.index.values())
+        return [count[self.index[word]] for word in vocabulary.words]
+
+    def sorted(self) -> tuple[Vocabulary, list[int]]:
+        """The vocabulary of the language-model room, and the number there of each number here (-1: lost)."""
+        vocabulary = Vocabulary.of(word for word in self.words if word is not None)
+        return vocabulary, [-1 if word is None else vocabulary.index[word] for word in self.words]
+
+
+_LOWER = str.maketrans("ABCDEFGHIJKLMNOPQRSTUVWXYZ", "abcdefghijklmnopqrstuvwxyz")
+
+
+def read_words(words: WordList, name: str, streams: Streams, *, silent: bool = False) -> None:
+    """Add the first word of every line of a file (-vocab); as words without probability if `silent` (-nonevents)."""
+    for line in streams.lines(name):
+        found = tokens(line)
+        if found:
+            words.add(found[0])
+            if silent:
+                words.silent.add(words.normal(found[0]))
+
+
+def read_aliases(words: WordList, name: str, streams: Streams) -> None:
+    """Read lines `alias word` (-vocab-aliases)."""
+    lines = streams.lines(name)
+    for line in lines:
+        match tokens(line):
+            case [alias, word, *_]:
+                words.alias(alias, word)
+            case [_]:
+                streams.say(f"{lines.position}warning: line contains only one token")
+
+
+def format_words(words: WordList) -> str:
+    """All names, one a line, sorted by bytes (-write-vocab)."""
+    return "".join(f"{name}\n" for name in sorted(words.index))
+
+
+def format_indices(words: WordList) -> str:
+    """Lines `NUMBER WORD` in number order, and a full stop (-write-vocab-index)."""
+    listed = (f"{number} {word}\n" for number, word in enumerate(words.words) if word is not None)
+    return "".join(listed) + ".\n"

@@ -1,0 +1,63 @@
+"""Totals and ranks of scored text, by hand."""
+
+import numpy as np
+import pytest
+
+from placerec.lm import count_ngrams, estimate, smoothing
+from placerec.lm.perplexity import Totals, measure, rank, rank_word, tally, tally_sentences
+
+ZERO = -np.inf
+
+
+def test_words_without_probability_are_counted_not_penalised() -> None:
+    log10_p = np.array([-1, ZERO, ZERO, -2], np.float32)
+    unknown = np.array([False, True, False, False])
+    totals = tally(log10_p, unknown, ended=True)
+    assert totals == Totals(sentences=1, words=3, oovs=1, zeroprobs=1, log10_p=-3)
+    assert totals.perplexity == pytest.approx(10 ** (3 / 2))
+    assert totals.perplexity_per_word == pytest.approx(10**3)
+
+
+def test_nothing_predicted_has_no_perplexity() -> None:
+    assert Totals(sentences=1, words=1, oovs=1, log10_p=-1).perplexity == pytest.approx(10)
+    assert Totals(sentences=1, words=1, oovs=1, log10_p=-1).perplexity_per_word is None
+    assert Totals(words=2, oovs=2).perplexity is None
+
+
+def test_sentences_sum_up_to_the_text() -> None:
+    log10_p = np.array([-1, -2, ZERO, -4], np.float32)
+    rows = tally_sentences(log10_p, np.zeros(4, bool), np.array([0, 0, 2, 2]), np.array([True, False, True]))
+    assert rows.tolist() == [[1, 1, 0, 0, -3], [0, 0, 0, 0, 0], [1, 1, 0, 1, -4]]
+    total = sum((Totals(*row) for row in rows.tolist()), Totals())
+    assert total == Totals(2, 2, 0, 1, -7)
+    assert total.times(2) == Totals(4, 4, 0, 2, -14)
+
+
+def test_a_model_measures_text() -> None:
+    model = estimate(count_ngrams([["a", "b"], ["b"]], 2), smoothing("witten-bell"))
+    totals = measure(model, [["a", "b"], ["zzz"]])
+    assert (totals.sentences, totals.words, totals.oovs) == (2, 3, 1)
+    known = model.score(["<s>", "a", "b", "</s>"])[1:].sum() + model.log10_p("</s>", ["zzz"])
+    assert totals.log10_p == pytest.approx(known)
+
+
+def test_of_equals_half_come_before() -> None:
+    p = np.array([0.4, 0.2, 0.2, 0.1, 0.1])
+    assert [rank(value, p) for value in (0.4, 0.2, 0.1, 0.0)] == [0, 2, 4, 5]
+
+
+def test_ranks_tell_words_from_sentence_ends() -> None:
+    everyone = np.log10(np.array([0.5, 0.3, 0.2])).astype(np.float32)
+    word = rank_word(float(everyone[0]), everyone, known=True, end=False, weight=2)
+    assert (word.words, word.tokens) == (2, 2)
+    assert (word.leading, word.leading_words) == ((2, 2, 2), (2, 2, 2))
+    assert word.absolute == pytest.approx(1)
+    end = rank_word(float(everyone[2]), everyone, known=True, end=True)
+    assert (end.words, end.tokens, end.leading, end.leading_words) == (0, 1, (0, 1, 1), (0, 0, 0))
+    assert (word + end).square == pytest.approx(2 * 0.25 + 0.64)
+
+
+def test_an_unknown_word_costs_nothing_and_a_known_one_everything() -> None:
+    everyone = np.log10(np.array([0.5, 0.5])).astype(np.float32)
+    assert rank_word(ZERO, everyone, known=False, end=False).absolute == 0
+    assert rank_word(ZERO, everyone, known=True, end=False).absolute == 1

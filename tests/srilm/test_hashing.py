@@ -1,0 +1,138 @@
+"""The order of SRILM's hash tables: section 15's numbers, a plain twin, and unsorted counts of the golden cases."""
+
+import gzip
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from placerec.lm.counts import count_ids
+from placerec.srilm.hashing import capacities, first_positions, name_keys, needed, slot_order, walk_order
+from placerec.srilm.streams import tokens
+from placerec.srilm.vocabulary import WordList
+
+UNSORTED = ("nc-out-unsorted", "nc-out-unsorted2", "nc-out-unsorted3")
+
+
+def plain_order(keys: list[int], size_hint: int = 0) -> list[int]:
+    """The table filled entry by entry, as section 15 tells it."""
+
+    def need(entries: int) -> int:
+        return entries if entries < 8 else int(np.float32(entries + 1) / np.float32(0.8))
+
+    def fill(places: list[int], capacity: int) -> list[int | None]:
+        slots: list[int | None] = [None] * capacity
+        for count, place in enumerate(places):
+            bits = capacity.bit_length() - 1
+            slot = count if capacity < 8 else ((keys[place] * 1103515245 + 12345) % 2**64 >> (30 - bits)) % capacity
+            while slots[slot] is not None:
+                slot = (slot + 1) % capacity
+            slots[slot] = place
+        return slots
+
+    capacity = 1
+    while capacity < need(size_hint):
+        capacity *= 2
+    slots: list[int | None] = [None] * capacity
+    for place in range(len(keys)):
+        held = [entry for entry in slots if entry is not None]
+        if need(place + 1) > capacity:
+            while need(place + 1) > capacity:
+                capacity *= 2
+            slots = fill([*fill_order(slots), place], capacity)
+        elif capacity < 8:
+            slots = fill([*held, place], capacity)
+        else:
+            slots = insert(slots, place, keys[place])
+    return fill_order(slots)
+
+
+def fill_order(slots: list[int | None]) -> list[int]:
+    return [entry for entry in slots if entry is not None]
+
+
+def insert(slots: list[int | None], place: int, key: int) -> list[int | None]:
+    bits = len(slots).bit_length() - 1
+    slot = ((key * 1103515245 + 12345) % 2**64 >> (30 - bits)) % len(slots)
+    while slots[slot] is not None:
+        slot = (slot + 1) % len(slots)
+    slots[slot] = place
+    return slots
+
+
+def test_capacities_are_those_of_section_15() -> None:
+    entries = np.arange(1, 14)
+    assert capacities(entries).tolist() == [1, 2, 4, 4, 8, 8, 8, 16, 16, 16, 16, 16, 32]
+    assert needed(np.array([0, 7, 8, 12, 13])).tolist() == [0, 7, 11, 16, 17]
+
+
+def test_small_tables_keep_the_order_of_insertion() -> None:
+    assert slot_order([9, 3, 7, 1]) == [0, 1, 2, 3]
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.integers(0, 400), unique=True, max_size=150), st.sampled_from([0, 3, 5, 40, 300]))
+def test_all_at_once_equals_entry_by_entry(keys: list[int], size_hint: int) -> None:
+    assert slot_order(keys, size_hint) == plain_order(keys, size_hint)
+
+
+def test_a_large_table_equals_entry_by_entry() -> None:
+    keys = np.random.default_rng(0).permutation(5000).tolist()
+    assert slot_order(keys) == plain_order(keys)
+
+
+def test_names_are_folded_as_signed_bytes_and_wrap() -> None:
+    assert name_keys(["a", "ab", "é"]).tolist() == [97, 97 * 9 + 98, 2**64 + 0xE9 - 256]
+    long = "x" * 100
+    key = 0
+    for _ in long:
+        key = (9 * key + ord("x")) % 2**64
+    assert name_keys([long]).tolist() == [key]
+
+
+def read_sentences(path: Path, words: WordList) -> tuple[list[int], list[int]]:
+    """SRILM's word numbers of a text, in sentences between <s> and </s>, and the lengths of these."""
+    numbers: list[int] = []
+    lengths: list[int] = []
+    for line in path.read_text("latin-1").split("\n"):
+        if found := tokens(line):
+            numbers += [words.add(word) for word in ["<s>", *found, "</s>"]]
+            lengths.append(len(found) + 2)
+    return numbers, lengths
+
+
+@pytest.mark.parametrize("case_id", UNSORTED)
+def test_unsorted_counts_come_in_the_order_of_srilm(case_id: str, shared: Path) -> None:
+    golden = shared / "srilm/golden"
+    lines = (golden / "cases.jsonl").read_text().splitlines()
+    case = next(case for case in map(json.loads, lines) if case["id"] == case_id)
+    order = int(case["args"][case["args"].index("-order") + 1])
+    folder = golden / "expected" / case_id
+    name = "x.counts" if case["outputs"] else "stdout"
+    packed = folder / f"{name}.gz"
+    expected = gzip.decompress(packed.read_bytes()) if packed.exists() else (folder / name).read_bytes()
+
+    words = WordList()
+    numbers, lengths = read_sentences(golden / case["inputs"][0], words)
+    vocabulary, renumbered = words.sorted()
+    ids = np.array(renumbered)[numbers]
+    counts = count_ids(ids, np.array(lengths), order, vocabulary)
+    first = first_positions(ids, np.array(lengths), counts.trie)
+    orders, rows = walk_order(counts.trie, counts.seen, first, np.argsort(renumbered))
+    texts = [counts.trie.texts(n) for n in range(1, order + 1)]
+    shown = [
+        f"{texts[n - 1][row]}\t{counts.counts[n - 1][row]}\n"
+        for n, row in zip(orders.tolist(), rows.tolist(), strict=True)
+    ]
+    assert "".join(shown).encode("latin-1") == expected
+
+
+def test_a_walk_of_nothing_is_empty() -> None:
+    vocabulary, _ = WordList().sorted()
+    counts = count_ids(np.zeros(0, np.int64), np.zeros(0, np.int64), 3, vocabulary)
+    first = first_positions(np.zeros(0, np.int64), np.zeros(0, np.int64), counts.trie)
+    orders, rows = walk_order(counts.trie, counts.seen, first, np.arange(len(vocabulary)))
+    assert orders.tolist() == rows.tolist() == []
