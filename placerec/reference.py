@@ -45,7 +45,10 @@ def smoothed(counts: Mapping[Ngram, int], vocabulary: Sequence[str], order: int,
         if name.endswith("-backoff"):
             seen = {word: (c - off) / whole for word, c in after[h].items()}
         else:
-            seen = {word: (c - max(off, 0) + shared * lower[word]) / whole for word, c in after[h].items()}
+            own = {word: (c - max(off, 0)) / whole for word, c in after[h].items()}
+            seen = {word: p_own + shared * lower[word] / whole for word, p_own in own.items()}
+            if T < V and sum(seen.values()) > 1 - 3e-6:  # Words unseen here would be left with nothing.
+                seen = own
         left = 1 - sum(seen.values())
         left_below = 1 - sum(lower.values())
         if not h:

@@ -107,6 +107,16 @@ def test_witten_bell_by_hand() -> None:
     assert 10 ** model.log10_p("c", ["a"]) == pytest.approx(0.08 / 2, rel=1e-6)
 
 
+def test_a_history_that_would_leave_nothing_backs_off() -> None:
+    # e was never seen, and the interpolated probabilities after "a c" would sum to 1 within 3e-6 without it.
+    texts = ["aaaaa", "aaaaaaacaca", "aaaaaaacaca", "aaaaaaccacb", "aaaaacacacd", "aaaaacaca"]
+    model = closed_model([list(text) for text in texts], "lidstone", 3, delta=0.1)
+    # N = 11, a follows 8 times, b, c and d once: c / (N + 5 delta), and what that leaves for e.
+    assert [10 ** model.log10_p(word, ["a", "c"]) for word in "abcde"] == pytest.approx(
+        [8 / 11.5, 1 / 11.5, 1 / 11.5, 1 / 11.5, 0.5 / 11.5], rel=1e-5
+    )
+
+
 def test_a_place_without_words_is_uniform() -> None:
     model = closed_model([], "witten-bell", 3)
     assert [10 ** model.log10_p(word) for word in VOCABULARY] == pytest.approx([0.2] * 5, rel=1e-6)
