@@ -162,11 +162,11 @@ def _report(folder: Path, results: Sequence[DemoResult], frames: int, commands: 
 def _results_table(results: Sequence[DemoResult]) -> str:
     majority = results[0].evaluation
     rows: list[Sequence[object]] = [
-        (f"always {majority.majority_place} (majority class)", "", f"{majority.majority_accuracy:.1%}", "", "")
+        (f"always {majority.majority_place} (majority class)", None, f"{majority.majority_accuracy:.1%}", None, None)
     ]
     for result in results:
         found = result.evaluation
-        latency = "" if found.change_latency_frames is None else f"{found.change_latency_frames:g}"
+        latency = None if found.change_latency_frames is None else f"{found.change_latency_frames:g}"
         name = f"{result.smoothing}{_note(result.order)}"
         rows.append((name, result.order, f"{found.accuracy:.1%}", f"{found.balanced_accuracy:.1%}", latency))
     return table(
