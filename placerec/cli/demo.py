@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import output_option, progress_bar, talk_options
+from placerec.cli.options import log, output_option, progress_bar, talk_options
 
 
 @click.command(epilog="Example: placerec demo")
@@ -23,4 +23,4 @@ def demo(out: Path | None, seed: int) -> None:
     out = out or Path("demo")
     results = run_demo(out, seed=seed, progress=progress_bar)
     click.echo(format_results(results))
-    click.echo(f"\nNow open {out / 'report.html'}", err=True)
+    log.info("\nNow open %s", out / "report.html")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import PATH, progress_bar, talk_options
+from placerec.cli.options import PATH, log, progress_bar, talk_options
 
 
 @click.command(epilog="Example: placerec lab LAB/ --scale tiny --seed 1")
@@ -29,4 +29,4 @@ def lab(out: Path, scale: str, seed: int) -> None:
 
     with progress_bar("render") as progress:
         frames = render_lab(out, scale=scale, seed=seed, progress=progress)
-    click.echo(f"{out}: 18 sequences, {frames} synthetic frames", err=True)
+    log.info("%s: 18 sequences, %d synthetic frames", out, frames)
