@@ -64,7 +64,6 @@ class Recognizer:
         self.selection = selection
         self.transition = transition or fixed_transition(len(models))
         self.dictionary = dictionary
-        self._models = dict(models)
         self._score: list[Scorer] = [(scorers or {}).get(place, model.score) for place, model in models.items()]
         self._words = _common_words(models)
         self._order = max(model.order for model in models.values())

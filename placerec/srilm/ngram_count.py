@@ -16,7 +16,7 @@ from placerec.srilm.discounting import MODIFYING, Fitter, choose, given_method, 
 from placerec.srilm.estimation_messages import EstimationMessages
 from placerec.srilm.first_seen import FirstSeen
 from placerec.srilm.options import Option, Options, Parsed, parse
-from placerec.srilm.streams import SrilmError, Streams
+from placerec.srilm.streams import SrilmError, Streams, exit_status
 from placerec.srilm.text import Marking, Text, read_text
 from placerec.srilm.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
 
@@ -86,14 +86,10 @@ OPTIONS: Options = {
 }
 
 
+@exit_status
 def ngram_count(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
     """Run `ngram-count` with these arguments; returns the exit status."""
-    try:
-        options = parse(tool, OPTIONS, arguments, streams)
-        _run(options, streams)
-    except SrilmError as error:
-        streams.say(str(error))
-        return error.status
+    _run(parse(tool, OPTIONS, arguments, streams), streams)
     return 0
 
 

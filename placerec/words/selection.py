@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from placerec.errors import StreamError
 
-KINDS = ("none", "subsample", "compress", "unique")
-
 
 @dataclass(frozen=True)
 class Selection:
