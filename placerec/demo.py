@@ -92,8 +92,7 @@ def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
         corpus.vocabulary,
         model,
         options=options,
-        sequences=corpus.sequences,
-        dictionary=corpus.dictionary,
+        record=corpus.record,
     )
     recognizer = load_recognizer(model)
     beliefs = [recognizer.decode(read_stream(path)) for path in files if path.stem.endswith(TEST_RUN)]

@@ -8,6 +8,7 @@ import pytest
 
 from placerec.lm import read_arpa
 from placerec.model import Options, parse_min_count, train_model
+from placerec.model.record import read_record
 from placerec.words import parse_selection, read_sentences, read_vocabulary
 
 MODELS = Path(__file__).resolve().parent.parent / "arpa_models"
@@ -32,8 +33,7 @@ def test_sentences_make_the_same_bytes(folder: Path, tmp_path: Path) -> None:
         read_vocabulary(folder / "vocab.txt"),
         tmp_path / "again",
         options=options,
-        sequences=made_by["sequences"],
-        dictionary=made_by["dictionary"],
+        record=read_record(folder / "model.json", made_by),
     )
     again = {path.relative_to(tmp_path / "again"): path.read_bytes() for path in (tmp_path / "again").rglob("*.*")}
     kept = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*.*")}

@@ -10,6 +10,7 @@ from placerec.errors import StreamError
 from placerec.files import read_text
 from placerec.frames.naming import unique_names
 from placerec.frames.places import check_place, check_twins
+from placerec.model.record import LearnedSequence, Record, record_streams
 from placerec.words import (
     Selection,
     Sentences,
@@ -35,12 +36,11 @@ class TokenMaker:
 
 @dataclass(frozen=True)
 class Corpus:
-    """Sentences per place with their vocabulary, ready for training."""
+    """Sentences per place, in alphabetical order, with their vocabulary and what is recorded of their sequences."""
 
     sentences: Mapping[str, Sentences] = field(repr=False)
     vocabulary: Sequence[str] = field(repr=False)
-    sequences: Sequence[str]
-    dictionary: str | None
+    record: Record
 
 
 def stream_files(sources: Iterable[Path | str]) -> list[Path]:
@@ -87,12 +87,21 @@ def read_corpus(sources: Sequence[Path | str], *, selection: Selection, vocabula
     # The first file of each place is enough to tell where its name stands.
     first = {place: path for stream, path in reversed([*zip(streams, files, strict=True)]) for place in stream.places}
     check_twins((place, _position(path, "place", place)) for place, path in first.items() if place)
-    sentences = sentences_per_place(streams, selection)
-    return Corpus(sentences, words, [s.name for s in streams], made_by.fingerprint if made_by else None)
+    sentences = [sentences_per_place([stream], selection) for stream in streams]
+    record = record_streams(streams, sentences, made_by.fingerprint if made_by else None)
+    return Corpus(_joined(sentences), words, record)
+
+
+def _joined(parts: Iterable[Mapping[str, Sentences]]) -> dict[str, Sentences]:
+    sentences: dict[str, Sentences] = {}
+    for part in parts:
+        for place, text in part.items():
+            sentences.setdefault(place, []).extend(text)
+    return dict(sorted(sentences.items()))
 
 
 def _sentence_corpus(folder: Path, vocabulary: Path | str | None) -> Corpus:
-    files = sorted(p for p in folder.iterdir() if p.suffix == ".txt" and p.name != VOCABULARY)
+    files = sorted((p for p in folder.iterdir() if p.suffix == ".txt" and p.name != VOCABULARY), key=lambda p: p.stem)
     if not files:
         raise StreamError(f"{folder}: holds neither token streams (.tsv) nor sentences (PLACE.txt)")
     words = read_vocabulary(vocabulary or _beside([folder, folder.resolve().parent]))
@@ -103,7 +112,8 @@ def _sentence_corpus(folder: Path, vocabulary: Path | str | None) -> Corpus:
             raise StreamError(f"{path}: place {path.stem!r} {reason}; rename the file")
         sentences[path.stem] = read_sentences(path)
         _check_listed((word for visit in sentences[path.stem] for word in visit), frozenset(words), path)
-    return Corpus(sentences, words, [], None)
+    visits = {place: len(text) for place, text in sentences.items()}
+    return Corpus(sentences, words, Record((LearnedSequence(folder.resolve().name, visits),)))
 
 
 def _check_listed(words: Iterable[str], listed: frozenset[str], path: Path) -> None:

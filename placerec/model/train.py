@@ -30,6 +30,7 @@ from placerec.lm import (
 from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
 from placerec.model.corpus import read_corpus
+from placerec.model.record import NO_RECORD, Record, describe_record
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, format_sentences, write_vocabulary
 
@@ -90,8 +91,7 @@ def train_lm(
         corpus.vocabulary,
         out,
         options=options,
-        sequences=corpus.sequences,
-        dictionary=corpus.dictionary,
+        record=corpus.record,
         progress=progress,
     )
     log.info("%s: %d places, order %d, %s", out, len(corpus.sentences), options.order, options.smoothing)
@@ -103,14 +103,13 @@ def train_model(
     out: Path | str,
     *,
     options: Options = Options(),
-    sequences: Sequence[str] = (),
-    dictionary: str | None = None,
+    record: Record = NO_RECORD,
     progress: Progress | None = None,
 ) -> None:
     """Train one language model per place and write the MODEL/ folder `out`, whole or not at all.
 
-    `sequences`: names of the training sequences, and `dictionary`: fingerprint of what made their words; both are
-    recorded. Raises ModelError for no place, a bad name of a place, a word that the vocabulary lacks or a bad option.
+    `record`: what model.json keeps of the training sequences. Raises ModelError for no place, a bad name of a place,
+    a word that the vocabulary lacks or a bad option.
     """
     _check(sentences, vocabulary, options)
     with whole_folder(Path(out), OWNED) as folder:
@@ -131,8 +130,8 @@ def train_model(
             write_arpa(model, folder / f"{place}.arpa", comment=signature(place, len(vocabulary), options))
             if progress:
                 progress(done + 1, len(sentences))
-        description = describe_model(list(sentences), len(vocabulary), options, sequences, dictionary)
-        write_text(folder / "model.json", json.dumps(description, indent=2, ensure_ascii=False) + "\n")
+        description = describe_model(list(sentences), len(vocabulary), options, record)
+        write_text(folder / "model.json", format_description(description) + "\n")
 
 
 def signature(place: str, words: int, options: Options) -> str:
@@ -167,10 +166,8 @@ def _delta(options: Options) -> float:
     return default_delta(options.smoothing) if options.delta is None else options.delta
 
 
-def describe_model(
-    places: Sequence[str], words: int, options: Options, sequences: Sequence[str], dictionary: str | None
-) -> dict[str, Any]:
-    """The content of model.json."""
+def describe_model(places: Sequence[str], words: int, options: Options, record: Record) -> dict[str, Any]:
+    """The content of model.json of a model that is not calibrated."""
     return {
         "format": FORMAT,
         "version": __version__,
@@ -182,10 +179,22 @@ def describe_model(
         "markers": options.markers,
         "select": str(options.select),
         "vocabulary": words,
-        "sequences": sorted(sequences),
-        "dictionary": dictionary,
+        **describe_record(record),
+        "calibration": None,
         "ngram_count": {place: ngram_count_command(place, options) for place in places},
     }
+
+
+def format_description(value: Any, indent: str = "") -> str:
+    """The text of model.json: what holds nothing but whole numbers is on one line, the rest as `json` indents it."""
+    inner = list(value.values()) if isinstance(value, dict) else value
+    if not isinstance(value, dict | list) or all(isinstance(item, int) for item in inner):
+        return json.dumps(value, ensure_ascii=False)
+    texts = [format_description(item, indent + "  ") for item in inner]
+    if isinstance(value, dict):
+        texts = [f"{json.dumps(key, ensure_ascii=False)}: {text}" for key, text in zip(value, texts, strict=True)]
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    return f"{opening}\n" + ",\n".join(f"{indent}  {text}" for text in texts) + f"\n{indent}{closing}"
 
 
 def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: Options) -> None:

@@ -3,7 +3,9 @@
 from placerec.words.selection import Selection, parse_selection, select, selector
 from placerec.words.sentences import (
     Sentences,
+    continues,
     format_sentences,
+    place_steps,
     read_sentences,
     sentences_per_place,
     time_gaps,
@@ -15,8 +17,10 @@ __all__ = [
     "Selection",
     "Sentences",
     "WordStream",
+    "continues",
     "format_sentences",
     "parse_selection",
+    "place_steps",
     "read_sentences",
     "read_stream",
     "read_vocabulary",

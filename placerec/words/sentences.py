@@ -30,6 +30,15 @@ def time_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
     return gaps
 
 
+def continues(stream: WordStream) -> NDArray[np.bool_]:
+    """bool (n,): whether a frame and the one before it are both labelled, with no gap in time between them."""
+    labelled = np.array([place != "" for place in stream.places], bool)
+    continued = labelled & ~time_gaps(stream.times)
+    continued[1:] &= labelled[:-1]
+    continued[:1] = False
+    return continued
+
+
 def visits(stream: WordStream, selection: Selection) -> list[tuple[str, list[str]]]:
     """The labelled visits of a stream in order: place, and the selected words of the visit (perhaps none).
 
@@ -37,16 +46,26 @@ def visits(stream: WordStream, selection: Selection) -> list[tuple[str, list[str
     frame and at a gap in time.
     """
     kept = select(stream.words, selection)
-    gaps = time_gaps(stream.times)
+    continued = continues(stream)
     found: list[tuple[str, list[str]]] = []
-    before = ""
     for i, place in enumerate(stream.places):
-        if place and (place != before or gaps[i]):
+        if place and not (continued[i] and place == stream.places[i - 1]):
             found.append((place, []))
         if place and kept[i]:
             found[-1][1].append(stream.words[i])
-        before = place
     return found
+
+
+def place_steps(stream: WordStream, places: Sequence[str]) -> NDArray[np.int64]:
+    """int64 (C, C): how often a frame at places[i] is followed by one at places[j].
+
+    Counted between the frames that `continues` connects; `places` must hold every label of the stream.
+    """
+    index = {place: i for i, place in enumerate(places)}
+    at = np.array([index[place] if place else -1 for place in stream.places], np.int64)
+    after = np.flatnonzero(continues(stream))
+    steps = np.bincount(at[after - 1] * len(places) + at[after], minlength=len(places) ** 2)
+    return steps.reshape(len(places), len(places))
 
 
 def sentences_per_place(streams: Iterable[WordStream], selection: Selection) -> dict[str, Sentences]:

@@ -28,9 +28,32 @@ def test_a_folder_of_streams_is_read_with_the_vocabulary_beside_them(tmp_path: P
     corpus = read_corpus([folder], selection=Selection())
     assert list(corpus.sentences) == list(PLACES)
     assert corpus.vocabulary == VOCABULARY
-    assert corpus.sequences == ["run1", "run2", "run3"]
-    assert corpus.dictionary is None
+    assert corpus.record.names == ["run1", "run2", "run3"]
+    assert corpus.record.dictionary is None
     assert sum(len(visit) for text in corpus.sentences.values() for visit in text) == 180
+
+
+def test_steps_and_distances_of_all_frames_are_recorded(tmp_path: Path) -> None:
+    """Selection leaves words out of the sentences, but no frame out of the steps and distances."""
+    head = "place\tword\tdistance\n"
+    write(tmp_path / "one.tsv", head + "hall\ta\t1\nhall\ta\t\nkitchen\ta\t2\n\ta\t9\nhall\tb\t0.5\n")
+    write(tmp_path / "two.tsv", head + "kitchen\ta\t2.1\nhall\tb\t0\n\tb\t9\n")
+    write(tmp_path / "vocab.txt", "a\nb\n")
+    corpus = read_corpus([tmp_path / "two.tsv", tmp_path / "one.tsv"], selection=parse_selection("unique"))
+    assert corpus.sentences == {"hall": [["b"], ["a"], ["b"]], "kitchen": [["a"]]}
+    assert corpus.record.transitions is not None
+    assert corpus.record.transitions.tolist() == [[1, 1], [1, 0]]
+    assert corpus.record.distances == {"hall": {-8: 1, 0: 1}, "kitchen": {8: 2}}
+    learned = [("two", {"hall": 1, "kitchen": 1}), ("one", {"hall": 2, "kitchen": 0})]
+    assert [(sequence.name, sequence.visits) for sequence in corpus.record.sequences] == learned
+
+
+def test_a_folder_of_sentences_has_no_steps(tmp_path: Path) -> None:
+    write(tmp_path / "text/hall.txt", "a b\nb\n")
+    write(tmp_path / "text/hall-2.txt", "b\n")
+    record = read_corpus([tmp_path / "text"], selection=Selection(), vocabulary=write(tmp_path / "v", "a\nb\n")).record
+    assert [(sequence.name, sequence.visits) for sequence in record.sequences] == [("text", {"hall": 2, "hall-2": 1})]
+    assert (record.transitions, record.distances, record.dictionary) == (None, None, None)
 
 
 def test_selection_is_applied(tmp_path: Path) -> None:
@@ -114,7 +137,7 @@ def test_names_of_sequences(tmp_path: Path) -> None:
     for folder in ("a", "b", "c/a"):
         write_tokens(tmp_path / folder, ["run"])
     corpus = read_corpus([tmp_path / "a/run.tsv", tmp_path / "b/run.tsv"], selection=Selection())
-    assert corpus.sequences == ["a-run", "b-run"]
+    assert corpus.record.names == ["a-run", "b-run"]
     refused("is named a-run, as ", tmp_path / "a/run.tsv", tmp_path / "c/a/run.tsv")
     refused("run.tsv: is given twice; name each sequence once", tmp_path / "a", tmp_path / "a/run.tsv")
 

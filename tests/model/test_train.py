@@ -17,6 +17,7 @@ from placerec.errors import LanguageModelError, ModelError, OutputError, SourceE
 from placerec.lm import SMOOTHINGS, count_ngrams, format_counts, read_arpa
 from placerec.lm.external import kenlm_scorer
 from placerec.model import Options, parse_min_count, train_model, train_place
+from placerec.model.record import LearnedSequence, Record
 from placerec.model.train import ngram_count_command
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, sentences_per_place
@@ -86,7 +87,9 @@ def test_a_model_without_delta_does_not_name_one(tmp_path: Path) -> None:
 
 def test_model_json_tells_all_options(tmp_path: Path) -> None:
     options = Options(3, "lidstone-backoff", 0.5, (1, 2), False, Selection("unique"))
-    train_model(KITCHEN, ("a", "b"), tmp_path, options=options, sequences=["run2", "run1"], dictionary="f00")
+    sequences = (LearnedSequence("run2", {"kitchen": 2}), LearnedSequence("run1", {"kitchen": 0}))
+    record = Record(sequences, "f00", np.array([[7]]), {"kitchen": {-3: 8, 2: 1}})
+    train_model(KITCHEN, ("a", "b"), tmp_path, options=options, record=record)
     assert json.loads((tmp_path / "model.json").read_text()) == {
         "format": "placerec model 1",
         "version": __version__,
@@ -98,8 +101,11 @@ def test_model_json_tells_all_options(tmp_path: Path) -> None:
         "markers": False,
         "select": "unique",
         "vocabulary": 2,
-        "sequences": ["run1", "run2"],
+        "sequences": [{"name": "run2", "visits": {"kitchen": 2}}, {"name": "run1", "visits": {"kitchen": 0}}],
         "dictionary": "f00",
+        "transitions": {"counts": [[7]]},
+        "distances": {"kitchen": {"-3": 8, "2": 1}},
+        "calibration": None,
         "ngram_count": {
             "kitchen": "ngram-count -text sentences/kitchen.txt -vocab vocab.txt -nonevents nonevents.txt -no-sos "
             "-no-eos -order 3 -gt1min 1 -gt2min 2 -gt3min 2 -addsmooth 0.5 -lm kitchen.arpa"

@@ -12,6 +12,7 @@ from placerec.words import (
     WordStream,
     format_sentences,
     parse_selection,
+    place_steps,
     read_sentences,
     sentences_per_place,
     time_gaps,
@@ -40,6 +41,28 @@ def test_a_gap_in_time_ends_a_visit() -> None:
         ("K", ["a", "b", "c"]),
         ("K", ["d", "e", "f"]),
     ]
+
+
+def test_steps_are_counted_inside_labelled_runs() -> None:
+    seen = stream("a b c d e f g", "K K L - L L K")
+    assert place_steps(seen, ["K", "L"]).tolist() == [[1, 1], [1, 1]]
+    assert place_steps(seen, ["J", "K", "L"]).tolist() == [[0, 0, 0], [0, 1, 1], [0, 1, 1]]
+    times = [0, 0.2, 0.4, 60, 60.2, 61.2]
+    assert place_steps(stream("a b c d e f", "K K L K K L", times), ["K", "L"]).tolist() == [[2, 2], [0, 0]]
+    assert place_steps(stream("", ""), []).tolist() == []
+
+
+@given(st.lists(st.tuples(st.sampled_from(["", "K", "L"]), st.sampled_from([0.0, 1.0, 1.0, 1.5, 99.0])), max_size=30))
+def test_a_change_of_place_without_a_break_is_a_step_between_two_visits(frames: list[tuple[str, float]]) -> None:
+    """Frames that stay are steps as well: one less in each visit than it has frames."""
+    bare = WordStream.of("run", ["a"] * len(frames), [place for place, _ in frames])
+    times = np.cumsum([step for _, step in frames])
+    seen = WordStream("run", bare.frames, times, bare.places, bare.words, bare.distances)
+    steps = place_steps(seen, ["K", "L"])
+    assert steps.trace() == sum(len(words) - 1 for _, words in visits(seen, Selection()))
+    changes = [pair for i, pair in enumerate(pairwise(bare.places)) if "" not in pair and not time_gaps(times)[i + 1]]
+    assert steps[0, 1] == changes.count(("K", "L"))
+    assert steps[1, 0] == changes.count(("L", "K"))
 
 
 def test_selection_runs_over_the_sequence_before_it_is_cut() -> None:
