@@ -1,5 +1,6 @@
 """Output files and folders that are written whole or not at all, and text that may be gzipped."""
 
+import ctypes
 import errno
 import gzip
 import os
@@ -18,6 +19,7 @@ if sys.platform != "win32":
     import fcntl
 
 PARTIAL = ".{}.partial-"
+REPLACED = ".{}.replaced-"
 
 
 @contextmanager
@@ -59,7 +61,7 @@ def whole_folder(path: Path, owned: tuple[str, ...]) -> Iterator[Path]:
         target = path.resolve()
         _check_replaceable(path, target, owned)
         target.parent.mkdir(parents=True, exist_ok=True)
-        _remove_abandoned(target)
+        restore_folder(target)
         partial = Path(tempfile.mkdtemp(prefix=PARTIAL.format(target.name), dir=target.parent))
         lock = _lock(partial)
     try:
@@ -71,6 +73,38 @@ def whole_folder(path: Path, owned: tuple[str, ...]) -> Iterator[Path]:
     finally:
         _unlock(lock)
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def restore_folder(path: Path) -> None:
+    """Mend what a killed run of `whole_folder` left behind: the old folder or the new one stays, and nothing else."""
+    target = path.resolve()
+    partial, replaced = PARTIAL.format(target.name), REPLACED.format(target.name)
+    for entry in target.parent.iterdir() if target.parent.is_dir() else ():
+        if entry.name.startswith((partial, replaced)) and entry.is_dir():
+            lock = _lock(entry)
+            if lock is not None:
+                if entry.name.startswith(replaced) and (entry / "old").exists() and not target.exists():
+                    (entry / "old").replace(target)
+                shutil.rmtree(entry, ignore_errors=True)
+                _unlock(lock)
+
+
+@contextmanager
+def held_folder(path: Path) -> Iterator[None]:
+    """Keep other runs from this folder while it is read to be replaced; OutputError if another run keeps it.
+
+    Otherwise, of two runs that add to one folder, the second to end would undo what the first one added.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        if not _hold(handle, path):
+            raise OutputError(f"{path}: is being changed by another run; try again when that has ended")
+        yield
+    finally:
+        os.close(handle)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -129,8 +163,27 @@ def _check_replaceable(path: Path, target: Path, owned: tuple[str, ...]) -> None
 
 
 def _exchange(partial: Path, target: Path) -> None:
-    """Put `partial` where `target` is, which is moved away first and comes back if that fails."""
-    aside = Path(tempfile.mkdtemp(prefix=PARTIAL.format(target.name), dir=target.parent))
+    """Put `partial` where `target` is, and what was there where `partial` was, or nowhere."""
+    if not _swap(partial, target):
+        _move_in(partial, target)
+
+
+def _swap(first: Path, second: Path) -> bool:
+    """Exchange two folders in one step of the system; False where one is missing or the system has no such step."""
+    if sys.platform == "win32":
+        return False
+    # RENAME_SWAP of macOS is RENAME_EXCHANGE of Linux, whose paths are relative to AT_FDCWD.
+    name, here = ("renamex_np", ()) if sys.platform == "darwin" else ("renameat2", (-100,))
+    rename = getattr(ctypes.CDLL(None), name, None)
+    return rename is not None and rename(*here, os.fsencode(first), *here, os.fsencode(second), 2) == 0
+
+
+def _move_in(partial: Path, target: Path) -> None:
+    """Put `partial` where `target` is, which is moved away first and comes back if that fails.
+
+    Whoever is killed between the two moves leaves no `target`, and `restore_folder` brings the old one back.
+    """
+    aside = Path(tempfile.mkdtemp(prefix=REPLACED.format(target.name), dir=target.parent))
     lock = _lock(aside)
     old = aside / "old"
     try:
@@ -152,17 +205,6 @@ def _exchange(partial: Path, target: Path) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _remove_abandoned(target: Path) -> None:
-    """Remove the partial folders of `target` that no running process holds."""
-    prefix = PARTIAL.format(target.name)
-    for entry in target.parent.iterdir():
-        if entry.name.startswith(prefix) and entry.is_dir():
-            lock = _lock(entry)
-            if lock is not None:
-                shutil.rmtree(entry, ignore_errors=True)
-                _unlock(lock)
-
-
 def _lock(folder: Path) -> int | None:
     """An open lock on a folder, None if another process has it; the system drops it however its process ends."""
     if sys.platform == "win32":
@@ -175,6 +217,18 @@ def _lock(folder: Path) -> int | None:
         _unlock(handle)
         return None
     return handle
+
+
+def _hold(handle: int, path: Path) -> bool:
+    """Lock an open folder that should be `path`: not if another process has it, or has replaced it since."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        # A file system without locks keeps nobody out.
+        return True
+    return os.path.samestat(os.fstat(handle), path.stat())
 
 
 def _unlock(lock: int | None) -> None:

@@ -18,6 +18,7 @@ from placerec.cli.srilm import SRILM_COMMANDS
 from placerec.cli.tokenize import tokenize
 from placerec.cli.train_lm import train_lm
 from placerec.cli.train_words import train_words
+from placerec.cli.update import update
 from placerec.errors import PlacerecError
 from placerec.version import __version__
 
@@ -68,7 +69,7 @@ def commands() -> None:
     """Which place is the camera in? Images become words, places become language models."""
 
 
-for command in (describe, train_words, tokenize, train_lm, decode, evaluate, inspect, check, lab, demo):
+for command in (describe, train_words, tokenize, train_lm, update, decode, evaluate, inspect, check, lab, demo):
     commands.add_command(command)
 for tool in SRILM_COMMANDS:
     commands.add_command(tool)

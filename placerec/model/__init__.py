@@ -3,7 +3,8 @@
 from placerec.model.corpus import Corpus, read_corpus
 from placerec.model.decode import decode, decode_lines, format_beliefs
 from placerec.model.load import PlaceModels, load_model, load_recognizer, make_recognizer
-from placerec.model.train import Options, parse_min_count, train_lm, train_model, train_place
+from placerec.model.train import Options, estimate_place, parse_min_count, train_lm, train_model
+from placerec.model.update import update
 
 __all__ = [
     "Corpus",
@@ -11,6 +12,7 @@ __all__ = [
     "PlaceModels",
     "decode",
     "decode_lines",
+    "estimate_place",
     "format_beliefs",
     "load_model",
     "load_recognizer",
@@ -19,5 +21,5 @@ __all__ = [
     "read_corpus",
     "train_lm",
     "train_model",
-    "train_place",
+    "update",
 ]

@@ -69,21 +69,32 @@ def read_streams(sources: Iterable[Path | str]) -> list[WordStream]:
     ]
 
 
-def read_corpus(sources: Sequence[Path | str], *, selection: Selection, vocabulary: Path | str | None = None) -> Corpus:
+def holds_sentences(sources: Sequence[Path | str]) -> bool:
+    """Whether `sources` are one folder of sentences, and not token streams."""
+    folder = Path(sources[0])
+    return len(sources) == 1 and folder.is_dir() and not any(p.name.endswith(STREAM_SUFFIXES) for p in folder.iterdir())
+
+
+def read_corpus(
+    sources: Sequence[Path | str],
+    *,
+    selection: Selection,
+    vocabulary: Path | str | None = None,
+    remedy: str = "add it, or remove the line",
+) -> Corpus:
     """Read what to train on: token streams, or one folder of sentences (PLACE.txt, one visit a line).
 
     `vocabulary`: a vocab.txt; by default the one beside the streams, or in or beside the folder. Raises StreamError
-    for anything missing or broken, and for a word that the vocabulary lacks, with file and line.
+    for anything missing or broken, and for a word that the vocabulary lacks, with file, line and `remedy`.
     """
-    folder = Path(sources[0])
-    if len(sources) == 1 and folder.is_dir() and not any(p.name.endswith(STREAM_SUFFIXES) for p in folder.iterdir()):
-        return _sentence_corpus(folder, vocabulary)
+    if holds_sentences(sources):
+        return _sentence_corpus(Path(sources[0]), vocabulary, remedy)
     files = stream_files(sources)
     words = read_vocabulary(vocabulary or _beside([path.parent for path in files]))
     made_by = dictionary_of(files)
     streams = read_streams(sources)
     for stream, path in zip(streams, files, strict=True):
-        _check_listed(stream.words, frozenset(words), path)
+        _check_listed(stream.words, frozenset(words), path, remedy)
     # The first file of each place is enough to tell where its name stands.
     first = {place: path for stream, path in reversed([*zip(streams, files, strict=True)]) for place in stream.places}
     check_twins((place, _position(path, "place", place)) for place, path in first.items() if place)
@@ -100,7 +111,7 @@ def _joined(parts: Iterable[Mapping[str, Sentences]]) -> dict[str, Sentences]:
     return dict(sorted(sentences.items()))
 
 
-def _sentence_corpus(folder: Path, vocabulary: Path | str | None) -> Corpus:
+def _sentence_corpus(folder: Path, vocabulary: Path | str | None, remedy: str) -> Corpus:
     files = sorted((p for p in folder.iterdir() if p.suffix == ".txt" and p.name != VOCABULARY), key=lambda p: p.stem)
     if not files:
         raise StreamError(f"{folder}: holds neither token streams (.tsv) nor sentences (PLACE.txt)")
@@ -111,16 +122,16 @@ def _sentence_corpus(folder: Path, vocabulary: Path | str | None) -> Corpus:
         if reason := check_place(path.stem):
             raise StreamError(f"{path}: place {path.stem!r} {reason}; rename the file")
         sentences[path.stem] = read_sentences(path)
-        _check_listed((word for visit in sentences[path.stem] for word in visit), frozenset(words), path)
+        _check_listed((word for visit in sentences[path.stem] for word in visit), frozenset(words), path, remedy)
     visits = {place: len(text) for place, text in sentences.items()}
     return Corpus(sentences, words, Record((LearnedSequence(folder.resolve().name, visits),)))
 
 
-def _check_listed(words: Iterable[str], listed: frozenset[str], path: Path) -> None:
+def _check_listed(words: Iterable[str], listed: frozenset[str], path: Path, remedy: str) -> None:
     for word in words:
         if word not in listed:
             position = _position(path, "word", word)
-            raise StreamError(f"{position}: the word {word!r} is not in the vocabulary; add it, or remove the line")
+            raise StreamError(f"{position}: the word {word!r} is not in the vocabulary; {remedy}")
 
 
 def _position(path: Path, column: str, value: str) -> str:
@@ -158,6 +169,16 @@ def dictionary_of(files: Iterable[Path]) -> TokenMaker | None:
                 "tokenize both with one words.npz"
             )
     return makers[0] if makers else None
+
+
+def check_dictionary(files: Iterable[Path], trained_on: str | None, model: Path) -> None:
+    """Raise StreamError if the token streams in `files` are known to be in other words than those of `model`."""
+    made_by = dictionary_of(files)
+    if made_by and trained_on and made_by.fingerprint != trained_on:
+        raise StreamError(
+            f"{made_by.folder}: its words are of another dictionary than those that trained {model}; "
+            "tokenize with the words.npz of the training"
+        )
 
 
 def _maker(folder: Path) -> TokenMaker | None:

@@ -36,7 +36,7 @@ def load_model(path: Path | str) -> PlaceModels:
         raise ModelError(f"{path}: is a file, and the folder of a model is expected; name the folder")
     if not path.exists():
         raise ModelError(f"{path}: no such model folder; `placerec train-lm TOKENS... -o {path}` makes one")
-    description = _read_description(path / "model.json")
+    description = read_description(path / "model.json")
     models = {}
     for place in description["places"]:
         arpa = path / f"{place}.arpa"
@@ -80,7 +80,7 @@ def make_recognizer(
     )
 
 
-def _read_description(path: Path) -> dict[str, Any]:
+def read_description(path: Path) -> dict[str, Any]:
     """What model.json says; ModelError unless everything that `load_model` uses is there and usable."""
     remedy = "train the model again"
     if not path.exists():

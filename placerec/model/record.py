@@ -35,6 +35,11 @@ class Record:
     distances: Mapping[str, Histogram] | None = field(default=None, repr=False)
 
     @property
+    def places(self) -> list[str]:
+        """The places that the sequences visited, in alphabetical order."""
+        return sorted({place for sequence in self.sequences for place in sequence.visits})
+
+    @property
     def names(self) -> list[str]:
         """The names of the sequences, in order."""
         return [sequence.name for sequence in self.sequences]
@@ -51,7 +56,7 @@ def record_streams(
         LearnedSequence(stream.name, {place: len(text) for place, text in its.items()})
         for stream, its in zip(streams, sentences, strict=True)
     )
-    places = sorted({place for sequence in learned for place in sequence.visits})
+    places = Record(learned).places
     transitions = np.zeros((len(places), len(places)), np.int64)
     distances: dict[str, Histogram] = {place: {} for place in places}
     for stream, sequence in zip(streams, learned, strict=True):
@@ -61,6 +66,46 @@ def record_streams(
             histogram = distance_histogram(stream.distances[labels == place])
             distances[place] = add_histograms(distances[place], histogram)
     return Record(learned, dictionary, transitions, distances)
+
+
+def add_record(record: Record, new: Record) -> Record:
+    """The record of the sequences of both, in this order."""
+    both = Record((*record.sequences, *new.sequences), record.dictionary or new.dictionary)
+    return _counted(both, record, new, 1)
+
+
+def take_away(record: Record, gone: Record) -> Record:
+    """The record without the sequences of `gone`; ModelError if more was counted in these than `record` holds."""
+    names = set(gone.names)
+    left = Record(tuple(s for s in record.sequences if s.name not in names), record.dictionary)
+    return _counted(left, record, gone, -1)
+
+
+def _counted(result: Record, record: Record, other: Record, sign: int) -> Record:
+    """`result` with the steps and distances of `record` plus `sign` times those of `other`; both have them, or none."""
+    its, others = record.distances, other.distances
+    if its is None or others is None:
+        return result
+    places = sorted({*record.places, *other.places})
+    steps = _spread(record, places) + sign * _spread(other, places)
+    histograms = {place: add_histograms(its.get(place, {}), others.get(place, {}), sign) for place in places}
+    kept = np.array([place in result.places for place in places], bool)
+    lost = [histograms.pop(place) for place in places if place not in result.places]
+    counts = [count for histogram in histograms.values() for count in histogram.values()]
+    if steps.min() < 0 or steps[~kept].any() or steps[:, ~kept].any() or any(lost) or min(counts, default=0) < 0:
+        names = ", ".join(other.names)
+        raise ModelError(
+            f"{names}: the labels, times or distances are not those that were learned; give them as they were"
+        )
+    return Record(result.sequences, result.dictionary, steps[np.ix_(kept, kept)], histograms)
+
+
+def _spread(record: Record, places: Sequence[str]) -> NDArray[np.int64]:
+    """The steps of a record between `places`, which hold its own."""
+    spread = np.zeros((len(places), len(places)), np.int64)
+    at = [places.index(place) for place in record.places]
+    spread[np.ix_(at, at)] = 0 if record.transitions is None else record.transitions
+    return spread
 
 
 def describe_record(record: Record) -> dict[str, Any]:

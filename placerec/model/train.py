@@ -13,13 +13,14 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from placerec.errors import LanguageModelError, ModelError
 from placerec.files import whole_folder, write_text
 from placerec.frames.places import check_place, check_twins
 from placerec.lm import (
     BackoffModel,
+    NgramCounts,
     count_ngrams,
     estimate,
     format_counts,
@@ -29,13 +30,14 @@ from placerec.lm import (
 )
 from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
-from placerec.model.corpus import read_corpus
+from placerec.model.corpus import VOCABULARY, read_corpus
 from placerec.model.record import NO_RECORD, Record, describe_record
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, format_sentences, write_vocabulary
 
 FORMAT = "placerec model 1"
-OWNED = ("*.arpa", "model.json", "vocab.txt", "nonevents.txt", "sentences", "counts")
+MODEL_JSON = "model.json"
+OWNED = ("*.arpa", MODEL_JSON, VOCABULARY, "nonevents.txt", "sentences", "counts")
 MAX_ORDER = 9
 log = logging.getLogger(__name__)
 Progress = Callable[[int, int], None]
@@ -57,6 +59,20 @@ class Options:
     select: Selection = Selection()
 
 
+class PlaceFiles(NamedTuple):
+    """The files of one place in a MODEL/ folder."""
+
+    arpa: Path
+    sentences: Path
+    counts: Path
+
+    @staticmethod
+    def of(folder: Path, place: str) -> "PlaceFiles":
+        return PlaceFiles(
+            folder / f"{place}.arpa", folder / "sentences" / f"{place}.txt", folder / "counts" / f"{place}.counts"
+        )
+
+
 def parse_min_count(text: str) -> tuple[int, ...]:
     """Minimum counts per order from `N[,N...]` or `srilm` (1,1,2: what ngram-count does); ModelError otherwise."""
     if text == "srilm":
@@ -67,13 +83,12 @@ def parse_min_count(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in parts)
 
 
-def train_place(sentences: Sentences, vocabulary: Sequence[str], options: Options) -> tuple[BackoffModel, str]:
-    """The language model of one place (V = all words of `vocabulary`), and the text of its counts file."""
-    counts = count_ngrams(sentences, options.order, vocabulary=vocabulary, markers=options.markers)
+def estimate_place(counts: NgramCounts, options: Options) -> BackoffModel:
+    """The language model of one place: V = all words of the counts' vocabulary."""
     non_events = () if options.markers else (SENTENCE_END,)
     rule = smoothing(options.smoothing, options.delta)
     model = estimate(counts, rule, min_count=options.min_count, non_events=non_events)
-    return with_unigrams(model, (UNKNOWN, SENTENCE_START, SENTENCE_END)), format_counts(counts)
+    return with_unigrams(model, (UNKNOWN, SENTENCE_START, SENTENCE_END))
 
 
 def train_lm(
@@ -113,25 +128,38 @@ def train_model(
     """
     _check(sentences, vocabulary, options)
     with whole_folder(Path(out), OWNED) as folder:
-        (folder / "sentences").mkdir()
-        (folder / "counts").mkdir()
-        write_vocabulary(vocabulary, folder / "vocab.txt")
-        if not options.markers:
-            write_text(folder / "nonevents.txt", SENTENCE_END + "\n")
-        for done, (place, text) in enumerate(sentences.items()):
-            if not text:
-                log.warning("place %s: no visit holds a selected word; its model is uniform", place)
-            try:
-                model, counts = train_place(text, vocabulary, options)
-            except LanguageModelError as error:
-                raise LanguageModelError(f"place {place}: {error}") from error
-            write_text(folder / "sentences" / f"{place}.txt", format_sentences(text))
-            write_text(folder / "counts" / f"{place}.counts", counts)
-            write_arpa(model, folder / f"{place}.arpa", comment=signature(place, len(vocabulary), options))
+        begin_model(folder, vocabulary, options)
+        for done, (place, text) in enumerate(sentences.items(), start=1):
+            counts = count_ngrams(text, options.order, vocabulary=vocabulary, markers=options.markers)
+            write_place(folder, place, format_sentences(text), counts, vocabulary, options)
             if progress:
-                progress(done + 1, len(sentences))
-        description = describe_model(list(sentences), len(vocabulary), options, record)
-        write_text(folder / "model.json", format_description(description) + "\n")
+                progress(done, len(sentences))
+        write_model_json(folder, list(sentences), vocabulary, options, record)
+
+
+def begin_model(folder: Path, vocabulary: Sequence[str], options: Options) -> None:
+    """Write into an empty MODEL/ folder what does not depend on the places."""
+    (folder / "sentences").mkdir()
+    (folder / "counts").mkdir()
+    write_vocabulary(vocabulary, folder / VOCABULARY)
+    if not options.markers:
+        write_text(folder / "nonevents.txt", SENTENCE_END + "\n")
+
+
+def write_place(
+    folder: Path, place: str, sentences: str, counts: NgramCounts, vocabulary: Sequence[str], options: Options
+) -> None:
+    """Write the files of one place into MODEL/: the text of its sentences, their counts, and the model of these."""
+    if not sentences:
+        log.warning("place %s: no visit holds a selected word; its model is uniform", place)
+    try:
+        model = estimate_place(counts, options)
+    except LanguageModelError as error:
+        raise LanguageModelError(f"place {place}: {error}") from error
+    files = PlaceFiles.of(folder, place)
+    write_text(files.sentences, sentences)
+    write_text(files.counts, format_counts(counts))
+    write_arpa(model, files.arpa, comment=signature(place, len(vocabulary), options))
 
 
 def signature(place: str, words: int, options: Options) -> str:
@@ -166,9 +194,11 @@ def _delta(options: Options) -> float:
     return default_delta(options.smoothing) if options.delta is None else options.delta
 
 
-def describe_model(places: Sequence[str], words: int, options: Options, record: Record) -> dict[str, Any]:
-    """The content of model.json of a model that is not calibrated."""
-    return {
+def write_model_json(
+    folder: Path, places: Sequence[str], vocabulary: Sequence[str], options: Options, record: Record
+) -> None:
+    """Write the model.json of a model that is not calibrated."""
+    description = {
         "format": FORMAT,
         "version": __version__,
         "places": list(places),
@@ -178,31 +208,41 @@ def describe_model(places: Sequence[str], words: int, options: Options, record: 
         "min_count": list(options.min_count),
         "markers": options.markers,
         "select": str(options.select),
-        "vocabulary": words,
+        "vocabulary": len(vocabulary),
         **describe_record(record),
         "calibration": None,
         "ngram_count": {place: ngram_count_command(place, options) for place in places},
     }
+    write_text(folder / MODEL_JSON, format_description(description))
 
 
-def format_description(value: Any, indent: str = "") -> str:
+def format_description(description: Mapping[str, Any]) -> str:
     """The text of model.json: what holds nothing but whole numbers is on one line, the rest as `json` indents it."""
+    return _format(dict(description), "") + "\n"
+
+
+def _format(value: Any, indent: str) -> str:
     inner = list(value.values()) if isinstance(value, dict) else value
     if not isinstance(value, dict | list) or all(isinstance(item, int) for item in inner):
         return json.dumps(value, ensure_ascii=False)
-    texts = [format_description(item, indent + "  ") for item in inner]
+    texts = [_format(item, indent + "  ") for item in inner]
     if isinstance(value, dict):
         texts = [f"{json.dumps(key, ensure_ascii=False)}: {text}" for key, text in zip(value, texts, strict=True)]
     opening, closing = "{}" if isinstance(value, dict) else "[]"
     return f"{opening}\n" + ",\n".join(f"{indent}  {text}" for text in texts) + f"\n{indent}{closing}"
 
 
-def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: Options) -> None:
+def check_options(options: Options) -> None:
+    """ModelError or LanguageModelError for an option that no model can be made with."""
     if not 1 <= options.order <= MAX_ORDER:
         raise ModelError(f"order {options.order} is not between 1 and {MAX_ORDER}")
     if not options.min_count or min(options.min_count) < 1:
         raise ModelError(f"minimum counts {options.min_count} are not understood; give numbers above 0, one at least")
     smoothing(options.smoothing, options.delta)
+
+
+def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: Options) -> None:
+    check_options(options)
     if not sentences:
         raise ModelError("no labelled frame found: label the frames (places.lst, or one folder per place) to train")
     for place in sentences:

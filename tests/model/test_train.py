@@ -16,7 +16,7 @@ from small import PLACES, VOCABULARY, run_through
 from placerec.errors import LanguageModelError, ModelError, OutputError, SourceError
 from placerec.lm import SMOOTHINGS, count_ngrams, format_counts, read_arpa
 from placerec.lm.external import kenlm_scorer
-from placerec.model import Options, parse_min_count, train_model, train_place
+from placerec.model import Options, estimate_place, parse_min_count, train_model
 from placerec.model.record import LearnedSequence, Record
 from placerec.model.train import ngram_count_command
 from placerec.version import __version__
@@ -162,8 +162,9 @@ def test_a_failure_leaves_the_old_model(tmp_path: Path) -> None:
 
 def test_minimum_counts_drop_rare_ngrams(tmp_path: Path) -> None:
     text: Sentences = [["a", "b", "c"], ["a", "b", "c"], ["b", "c", "a"]]
-    model, _ = train_place(text, ("a", "b", "c"), Options(3, min_count=parse_min_count("srilm")))
-    all_kept, _ = train_place(text, ("a", "b", "c"), Options(3))
+    counts = count_ngrams(text, 3, vocabulary=("a", "b", "c"), markers=False)
+    model = estimate_place(counts, Options(3, min_count=parse_min_count("srilm")))
+    all_kept = estimate_place(counts, Options(3))
     assert [len(p) for p in model.log10_ps] == [6, 3, 1]
     assert [len(p) for p in all_kept.log10_ps] == [6, 3, 2]
 

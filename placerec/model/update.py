@@ -1,0 +1,207 @@
+"""Learning on the robot: labelled visits are added to a MODEL/ folder, or taken away, without the old recordings.
+
+Counts are sums over visits, so the new visits are counted and added to, or taken from, the counts files. Only the
+models of their places are estimated again; the files of other places stay as they are.
+"""
+
+import logging
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
+from pathlib import Path
+
+from placerec.errors import LanguageModelError, ModelError, StreamError
+from placerec.files import held_folder, read_text, restore_folder, whole_folder
+from placerec.frames.places import check_twins
+from placerec.lm import NgramCounts, count_ngrams
+from placerec.lm.count_sums import read_counts, subtract_counts
+from placerec.lm.counts import SENTENCE_END, SENTENCE_START, add_counts
+from placerec.lm.trie import Vocabulary
+from placerec.model.corpus import VOCABULARY, Corpus, check_dictionary, holds_sentences, read_corpus, stream_files
+from placerec.model.load import read_description
+from placerec.model.record import Record, add_record, read_record, take_away
+from placerec.model.train import (
+    MODEL_JSON,
+    OWNED,
+    Options,
+    PlaceFiles,
+    begin_model,
+    check_options,
+    write_model_json,
+    write_place,
+)
+from placerec.words import format_sentences, parse_selection, read_vocabulary
+
+# The sentences of a place, as in its file.
+Lines = list[str]
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Model:
+    """A MODEL/ folder as far as learning goes on from it."""
+
+    path: Path
+    options: Options
+    vocabulary: Sequence[str] = field(repr=False)
+    record: Record = field(repr=False)
+    calibrated: bool
+
+
+def update(
+    model: Path | str,
+    tokens: Sequence[Path | str],
+    *,
+    forget: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """`placerec update`: add the labelled visits in `tokens` to a MODEL/ folder, or take them away to `forget` them.
+
+    `tokens`: token streams, or a folder of sentences if the model was trained on one. The folder then holds what
+    training on all sequences, the old ones first, would have written, without the calibration. Raises ModelError,
+    StreamError or LanguageModelError, and leaves the model as it was, for visits that do not belong to the model, for
+    sequences that it knows already (or not, to forget), and for a folder that was edited.
+    """
+    path = Path(model)
+    restore_folder(path)
+    if not path.is_dir():
+        raise ModelError(f"{path}: no such model folder; `placerec train-lm TOKENS... -o {path}` makes one")
+    with held_folder(path):
+        old = _read_model(path)
+        new = _read_visits(tokens, old)
+        record = _without(old, new.record) if forget else _with(old, new.record)
+        changed = [p for p in record.places if new.sentences.get(p) or p not in old.record.places]
+        with whole_folder(path, OWNED) as folder:
+            begin_model(folder, old.vocabulary, old.options)
+            for place in set(record.places) - set(changed):
+                for source, target in zip(PlaceFiles.of(path, place), PlaceFiles.of(folder, place), strict=True):
+                    shutil.copyfile(source, target)
+            for done, place in enumerate(changed, start=1):
+                lines, counts = _forgotten(old, new, place) if forget else _learned(old, new, place)
+                write_place(folder, place, "".join(lines), counts, old.vocabulary, old.options)
+                if progress:
+                    progress(done, len(changed))
+            write_model_json(folder, record.places, old.vocabulary, old.options, record)
+    if old.calibrated:
+        log.warning("%s: the calibration was of the former model, and is dropped; calibrate again", path)
+    verb, names = "forgotten" if forget else "learned", ", ".join(new.record.names)
+    log.info("%s: %s %s; estimated again: %s", path, verb, names, ", ".join(changed) or "nothing")
+
+
+def _read_model(path: Path) -> _Model:
+    """What a MODEL/ folder says of itself, if its visits can be told apart and none of its files is missing."""
+    description = read_description(path / MODEL_JSON)
+    record = read_record(path / MODEL_JSON, description)
+    for file in (file for place in record.places for file in PlaceFiles.of(path, place)):
+        if not file.is_file():
+            raise ModelError(f"{file}: missing, though {MODEL_JSON} names visits to its place; train the model again")
+    keys = ("order", "smoothing", "delta", "min_count", "markers", "select")
+    try:
+        order, method, delta, min_count, markers, select = (description[key] for key in keys)
+        options = Options(order, method, delta, tuple(min_count), markers, parse_selection(select))
+        check_options(options)
+    except (KeyError, TypeError) as error:
+        raise ModelError(f"{path / MODEL_JSON}: its options make no model; train the model again") from error
+    vocabulary = read_vocabulary(path / VOCABULARY)
+    return _Model(path, options, vocabulary, record, description.get("calibration") is not None)
+
+
+def _read_visits(tokens: Sequence[Path | str], old: _Model) -> Corpus:
+    """The labelled visits in `tokens`, if they are in the model's words and of the kind that it was trained on."""
+    streams = old.record.transitions is not None
+    if streams == holds_sentences(tokens):
+        kind = "token streams" if streams else "a folder of sentences"
+        raise StreamError(f"{tokens[0]}: is not what {old.path} was trained on; give {kind}")
+    if streams:
+        check_dictionary(stream_files(tokens), old.record.dictionary, old.path)
+    remedy = f"tokenize as {old.path} was, or train a model on all words"
+    return read_corpus(tokens, selection=old.options.select, vocabulary=old.path / VOCABULARY, remedy=remedy)
+
+
+def _with(old: _Model, new: Record) -> Record:
+    """The record with `new` sequences, if they are new and their places fit beside the old ones."""
+    for name in new.names:
+        if name in old.record.names:
+            raise ModelError(f"{name}: {old.path} has learned a sequence of this name; rename the file of another one")
+    if not new.places:
+        raise ModelError("no labelled frame found: label the frames (places.lst, or one folder per place) to learn")
+    check_twins((p, s.name) for s in (*old.record.sequences, *new.sequences) for p in s.visits)
+    return add_record(old.record, new)
+
+
+def _without(old: _Model, gone: Record) -> Record:
+    """The record without sequences that were learned, and that gave then as many visits as they give now."""
+    learned = {sequence.name: sequence.visits for sequence in old.record.sequences}
+    for sequence in gone.sequences:
+        if sequence.name not in learned:
+            raise ModelError(f"{sequence.name}: {old.path} never learned a sequence of this name; see its {MODEL_JSON}")
+        if sequence.visits != learned[sequence.name]:
+            raise _not_as_learned(sequence.name)
+    record = take_away(old.record, gone)
+    if not record.places:
+        raise ModelError(f"{old.path}: has learned nothing else, and a model has one place at least; remove the folder")
+    return record
+
+
+def _not_as_learned(name: str) -> ModelError:
+    return ModelError(
+        f"{name}: its visits are not those that were learned; forget it with the words and labels of then"
+    )
+
+
+def _learned(old: _Model, new: Corpus, place: str) -> tuple[Lines, NgramCounts]:
+    """The sentences of a place with the new ones behind, and their counts."""
+    lines, counts = _lines(new, place), _count(old, new, place)
+    if place not in old.record.places:
+        return lines, counts
+    former, former_counts = _read_place(old, place, counts.trie.vocabulary)
+    return former + lines, add_counts(former_counts, counts)
+
+
+def _forgotten(old: _Model, gone: Corpus, place: str) -> tuple[Lines, NgramCounts]:
+    """The sentences of a place without those that are to be forgotten, and their counts."""
+    counts = _count(old, gone, place)
+    former, former_counts = _read_place(old, place, counts.trie.vocabulary)
+    blocks = _blocks(old.record, place, former)
+    for name, block in _blocks(gone.record, place, _lines(gone, place)).items():
+        if blocks.pop(name) != block:
+            raise _not_as_learned(name)
+    try:
+        return [line for block in blocks.values() for line in block], subtract_counts(former_counts, counts)
+    except LanguageModelError as error:
+        raise _edited(PlaceFiles.of(old.path, place).counts, str(error)) from error
+
+
+def _blocks(record: Record, place: str, lines: Lines) -> dict[str, Lines]:
+    """The sentences of a place that each sequence gave."""
+    ends = [0, *accumulate(sequence.visits.get(place, 0) for sequence in record.sequences)]
+    return {name: lines[start:end] for name, (start, end) in zip(record.names, pairwise(ends), strict=True)}
+
+
+def _read_place(model: _Model, place: str, vocabulary: Vocabulary) -> tuple[Lines, NgramCounts]:
+    """The sentences and counts of a place; ModelError if they do not agree, with each other and with model.json."""
+    files = PlaceFiles.of(model.path, place)
+    lines = read_text(files.sentences, ModelError).splitlines(keepends=True)
+    counts = read_counts(files.counts, vocabulary, model.options.order)
+    visits = sum(sequence.visits.get(place, 0) for sequence in model.record.sequences)
+    if len(lines) != visits:
+        raise _edited(files.sentences, f"holds {len(lines)} sentences, and {MODEL_JSON} names {visits}")
+    words = sum(len(line.split()) for line in lines)
+    counted = counts.counts[0][~vocabulary.mask([SENTENCE_START, SENTENCE_END])].sum()
+    if words != counted:
+        raise _edited(files.counts, f"counts {counted} words, and {files.sentences} holds {words}")
+    return lines, counts
+
+
+def _edited(path: Path, what: str) -> ModelError:
+    return ModelError(f"{path}: {what}, as after an edit; train the model again")
+
+
+def _lines(corpus: Corpus, place: str) -> Lines:
+    return format_sentences(corpus.sentences[place]).splitlines(keepends=True)
+
+
+def _count(model: _Model, corpus: Corpus, place: str) -> NgramCounts:
+    order, markers = model.options.order, model.options.markers
+    return count_ngrams(corpus.sentences[place], order, vocabulary=model.vocabulary, markers=markers)
