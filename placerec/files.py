@@ -157,7 +157,8 @@ def _check_replaceable(path: Path, target: Path, owned: tuple[str, ...]) -> None
         entry.name for entry in target.iterdir() if not any(fnmatch(entry.name, pattern) for pattern in patterns)
     )
     if foreign:
-        raise OutputError(f"{path}: holds {foreign[0]}, which this command does not write; name another folder")
+        remedy = "name another folder, or move it away"
+        raise OutputError(f"{path}: holds {foreign[0]}, which this command does not write; {remedy}")
     if target == Path.cwd() or target.is_mount():
         raise OutputError(f"{path}: is the current folder or a mounted one; name a folder in it")
 

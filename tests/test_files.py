@@ -11,7 +11,10 @@ import pytest
 
 from placerec import files
 from placerec.errors import OutputError, StreamError
-from placerec.files import read_text, whole_file, whole_folder, write_text
+from placerec.files import held_folder, read_text, restore_folder, whole_file, whole_folder, write_text
+
+if sys.platform != "win32":
+    import fcntl
 
 OWNED = ("*.tsv", "sub")
 
@@ -105,6 +108,79 @@ def test_a_failure_leaves_the_old_folder(tmp_path: Path) -> None:
     assert names(tmp_path) == ["out"]
 
 
+def no_swap(first: Path, second: Path) -> bool:
+    """A system that cannot exchange two folders in one step."""
+    return False
+
+
+@pytest.mark.skipif(sys.platform not in ("linux", "darwin"), reason="no such step there")
+def test_folders_change_places_in_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{name}.tsv").write_text(name)
+    assert not files._swap(tmp_path / "a", tmp_path / "c")
+    assert files._swap(tmp_path / "a", tmp_path / "b")
+    assert (names(tmp_path / "a"), names(tmp_path / "b")) == (["b.tsv"], ["a.tsv"])
+    # And this is how a folder is replaced: nothing is moved away first.
+    monkeypatch.setattr(files, "_move_in", no_swap)
+    with whole_folder(tmp_path / "a", OWNED) as partial:
+        (partial / "new.tsv").write_text("new")
+    assert names(tmp_path / "a") == ["new.tsv"]
+    assert names(tmp_path) == ["a", "b"]
+
+
+def test_a_folder_takes_the_place_of_the_old_one_in_two_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "_swap", no_swap)
+    test_a_folder_takes_the_place_of_the_old_one(tmp_path)
+
+
+def test_a_folder_that_was_moved_away_by_a_killed_run_comes_back(tmp_path: Path) -> None:
+    """Unless another run has written one since."""
+    folder = tmp_path / "out"
+    for there, kept in ((False, "old.tsv"), (True, "new.tsv")):
+        (tmp_path / ".out.replaced-x/old").mkdir(parents=True)
+        (tmp_path / ".out.replaced-x/old/old.tsv").write_text("old")
+        (tmp_path / ".out.partial-x").mkdir()
+        if there:
+            (folder / "old.tsv").rename(folder / "new.tsv")
+        restore_folder(folder)
+        assert names(tmp_path) == ["out"]
+        assert names(folder) == [kept]
+    restore_folder(tmp_path / "nowhere/out")
+    assert names(tmp_path) == ["out"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks on folders there")
+def test_a_folder_is_held_by_one_run_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    refusal = pytest.raises(OutputError, match="out: is being changed by another run; try again when that has ended")
+    with held_folder(folder), refusal, held_folder(folder):
+        pytest.fail("two runs hold the folder")
+    with held_folder(folder), whole_folder(folder, OWNED) as partial:
+        (partial / "new.tsv").write_text("new")
+    with held_folder(folder):
+        pass
+    flock = fcntl.flock
+
+    def replaced(handle: int, operation: int) -> None:
+        flock(handle, operation)
+        folder.rename(tmp_path / "former")
+        folder.mkdir()
+
+    # What was opened may be replaced before it is locked.
+    monkeypatch.setattr("fcntl.flock", replaced)
+    with refusal, held_folder(folder):
+        pytest.fail("the folder that is held is not there any more")
+
+    def no_locks(handle: int, operation: int) -> None:
+        raise OSError(37, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", no_locks)
+    with held_folder(folder):
+        pass
+
+
 def test_the_old_folder_comes_back_if_the_exchange_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "out"
     folder.mkdir()
@@ -116,6 +192,7 @@ def test_the_old_folder_comes_back_if_the_exchange_fails(tmp_path: Path, monkeyp
             raise OSError(5, "Input/output error")
         return replace(self, target)
 
+    monkeypatch.setattr(files, "_swap", no_swap)
     monkeypatch.setattr(Path, "replace", refuse)
     with pytest.raises(OutputError, match="Input/output error"), whole_folder(folder, OWNED) as partial:
         (partial / "new.tsv").write_text("new")
@@ -175,6 +252,7 @@ def test_a_folder_put_there_during_the_exchange_goes_too(tmp_path: Path, monkeyp
             (folder / "other.tsv").write_text("other run")
         return replace(self, target)
 
+    monkeypatch.setattr(files, "_swap", no_swap)
     monkeypatch.setattr(Path, "replace", race)
     with whole_folder(folder, OWNED) as partial:
         (partial / "mine.tsv").write_text("mine")

@@ -13,10 +13,10 @@ from placerec.cli.options import PATH, progress_bar, talk_options
 @click.option("--forget", is_flag=True, help="Take these sequences away instead; they must have been learned.")
 @talk_options
 def update(model: Path, tokens: tuple[Path, ...], forget: bool) -> None:
-    """Add labelled visits to a model, or take them away, without the old data.
+    """Learn more labelled visits, or forget some.
 
-    TOKENS are token streams (.tsv) or folders of them; for a model of sentences, one folder of sentences. MODEL/ then
-    holds what train-lm would have made of all sequences, the old ones first.
+    TOKENS are token streams (.tsv) or folders of them; for a model of sentences, one folder of sentences. The old ones
+    are not needed: MODEL/ will be as if train-lm had been given all sequences, the old ones first.
     """
     from placerec.model import update as run
 

@@ -127,18 +127,15 @@ def read_record(path: Path, description: Mapping[str, Any]) -> Record:
             LearnedSequence(str(item["name"]), {place: _count(n) for place, n in item["visits"].items()})
             for item in description["sequences"]
         )
-        size = len(description["places"])
-        steps, known = description["transitions"], description["distances"]
-        transitions = None if steps is None else np.array([[*map(_count, row)] for row in steps["counts"]], np.int64)
-        distances = known and {
-            place: {int(b): _count(count) for b, count in known[place].items()} for place in description["places"]
-        }
-        return Record(
-            learned,
-            description["dictionary"],
-            None if transitions is None else transitions.reshape(size, size),
-            distances,
-        )
+        places, steps, known = description["places"], description["transitions"], description["distances"]
+        if Record(learned).places != places or (steps is None) != (known is None):
+            raise ValueError(places)
+        transitions = steps and np.array([[*map(_count, row)] for row in steps["counts"]], np.int64)
+        distances = known and {place: {int(b): _count(n) for b, n in known[place].items()} for place in places}
+        record = Record(learned, description["dictionary"], transitions, distances)
+        if transitions is not None and transitions.shape != (len(places), len(places)):
+            raise ValueError(transitions.shape)
+        return record
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(
             f"{path}: does not say which visits were learned, as an older placerec or an editor leaves it; "

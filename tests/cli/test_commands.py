@@ -69,7 +69,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_all_commands_of_the_contract_so_far_are_there() -> None:
-    expected = "check decode demo describe evaluate inspect lab tokenize train-lm train-words"
+    expected = "check decode demo describe evaluate inspect lab tokenize train-lm train-words update"
     assert " ".join(NAMES) == expected
     assert set(commands.commands) == {*NAMES, *TOOLS}
 
@@ -313,6 +313,22 @@ def test_training_options_reach_the_model(world: Path, tmp_path: Path) -> None:
         "min_count": [1, 2],
         "markers": True,
     }
+
+
+def test_visits_are_learned_and_forgotten(world: Path, tmp_path: Path) -> None:
+    first, second = world / "tokens/run1.tsv", world / "tokens/run2.tsv"
+    done("train-lm", first, "-o", tmp_path / "model")
+    before = (tmp_path / "model/hall.arpa").read_bytes()
+    learned = done("update", tmp_path / "model", second)
+    assert learned.stdout == ""
+    assert learned.stderr == f"{tmp_path / 'model'}: learned run2; estimated again: hall, kitchen, office\n"
+    assert (tmp_path / "model/hall.arpa").read_bytes() == (world / "model/hall.arpa").read_bytes() != before
+    fails("run2: .*model has learned a sequence of this name", "update", tmp_path / "model", second)
+    forgotten = done("update", tmp_path / "model", second, "--forget").stderr
+    assert forgotten == f"{tmp_path / 'model'}: forgotten run2; estimated again: hall, kitchen, office\n"
+    assert (tmp_path / "model/hall.arpa").read_bytes() == before
+    assert done("update", tmp_path / "model", second, "-q").stderr == ""
+    misused("Missing argument 'TOKENS...'", "update", tmp_path / "model")
 
 
 def test_check_and_inspect_name_what_they_cannot_read(world: Path, tmp_path: Path) -> None:
