@@ -89,8 +89,9 @@ def _counted(result: Record, record: Record, other: Record, sign: int) -> Record
     places = sorted({*record.places, *other.places})
     steps = _spread(record, places) + sign * _spread(other, places)
     histograms = {place: add_histograms(its.get(place, {}), others.get(place, {}), sign) for place in places}
-    kept = np.array([place in result.places for place in places], bool)
-    lost = [histograms.pop(place) for place in places if place not in result.places]
+    left = set(result.places)
+    kept = np.array([place in left for place in places], bool)
+    lost = [histograms.pop(place) for place in places if place not in left]
     counts = [count for histogram in histograms.values() for count in histogram.values()]
     if steps.min() < 0 or steps[~kept].any() or steps[:, ~kept].any() or any(lost) or min(counts, default=0) < 0:
         names = ", ".join(other.names)
@@ -136,7 +137,7 @@ def read_record(path: Path, description: Mapping[str, Any]) -> Record:
         if transitions is not None and transitions.shape != (len(places), len(places)):
             raise ValueError(transitions.shape)
         return record
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise ModelError(
             f"{path}: does not say which visits were learned, as an older placerec or an editor leaves it; "
             "train the model again"

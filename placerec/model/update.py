@@ -71,7 +71,8 @@ def update(
         old = _read_model(path)
         new = _read_visits(tokens, old)
         record = _without(old, new.record) if forget else _with(old, new.record)
-        changed = [p for p in record.places if new.sentences.get(p) or p not in old.record.places]
+        former = set(old.record.places)
+        changed = [place for place in record.places if new.sentences.get(place) or place not in former]
         with whole_folder(path, OWNED) as folder:
             begin_model(folder, old.vocabulary, old.options)
             for place in set(record.places) - set(changed):
@@ -121,8 +122,9 @@ def _read_visits(tokens: Sequence[Path | str], old: _Model) -> Corpus:
 
 def _with(old: _Model, new: Record) -> Record:
     """The record with `new` sequences, if they are new and their places fit beside the old ones."""
+    learned = set(old.record.names)
     for name in new.names:
-        if name in old.record.names:
+        if name in learned:
             raise ModelError(f"{name}: {old.path} has learned a sequence of this name; rename the file of another one")
     if not new.places:
         raise ModelError("no labelled frame found: label the frames (places.lst, or one folder per place) to learn")
