@@ -24,9 +24,11 @@ _ROOMS = {
         "Transition",
         "filter_stream",
         "fixed_transition",
+        "learned_transition",
         "read_beliefs",
+        "read_transitions",
     ),
-    "placerec.model": ("Options", "decode", "load_recognizer", "train_lm", "update"),
+    "placerec.model": ("Decoding", "Options", "decode", "load_recognizer", "train_lm", "update"),
     "placerec.evaluation": ("evaluate", "evaluate_files"),
     "placerec.lab": ("render_lab",),
 }
@@ -43,13 +45,15 @@ if TYPE_CHECKING:
         Transition,
         filter_stream,
         fixed_transition,
+        learned_transition,
         read_beliefs,
+        read_transitions,
     )
     from placerec.lab import render_lab
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.checks import check_model
     from placerec.lm.inspection import inspect_model
-    from placerec.model import Options, decode, load_recognizer, train_lm, update
+    from placerec.model import Decoding, Options, decode, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
@@ -58,6 +62,7 @@ __all__ = [
     "BackoffModel",
     "Belief",
     "Beliefs",
+    "Decoding",
     "DescriptorSpec",
     "Dictionary",
     "Frame",
@@ -81,12 +86,14 @@ __all__ = [
     "fixed_transition",
     "gist",
     "inspect_model",
+    "learned_transition",
     "load_recognizer",
     "parse_selection",
     "read_arpa",
     "read_beliefs",
     "read_gray",
     "read_stream",
+    "read_transitions",
     "render_lab",
     "select",
     "smoothing",

@@ -16,6 +16,7 @@ from placerec.cli.options import (
     talk_options,
     words_option,
 )
+from placerec.errors import ModelError
 
 
 @click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
@@ -24,11 +25,28 @@ from placerec.cli.options import (
 @words_option(False, "The dictionary, if TOKENS are images.")
 @format_option(" of images")
 @click.option(
-    "--stay",
-    type=FiniteRange(0, 1),
-    default=0.99,
+    "--transition",
+    metavar="fixed|learned|FILE",
+    default="fixed",
     show_default=True,
-    help="Probability of staying in a place at each selected word.",
+    help="How the place changes: --stay, as the training counted it, or a table of probabilities.",
+)
+@click.option("--stay", type=FiniteRange(0, 1), help="Probability of staying in a place for one step.  [default: 0.99]")
+@click.option(
+    "--per",
+    type=click.Choice(["update", "frame", "second"]),
+    help="What one step is: a selected word, a frame, a second.  [default: update]",
+)
+@click.option(
+    "--max-gap",
+    metavar="SECONDS",
+    type=FiniteRange(0, min_open=True),
+    help="More time than this between two frames begins a new sequence.",
+)
+@click.option("--smooth", is_flag=True, help="Let all words of a sequence count for every frame.")
+@click.option("--viterbi", is_flag=True, help="Write the most probable path as best.")
+@click.option(
+    "--lag", metavar="N", type=click.IntRange(0), help="Let the words up to N frames later count for each frame."
 )
 @click.option(
     "--scorer",
@@ -47,7 +65,13 @@ def decode(
     model: Path,
     words: Path | None,
     format_: str,
-    stay: float,
+    transition: str,
+    stay: float | None,
+    per: str | None,
+    max_gap: float | None,
+    smooth: bool,
+    viterbi: bool,
+    lag: int | None,
     scorer: str,
     as_json: bool,
     out: Path | None,
@@ -57,15 +81,23 @@ def decode(
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, images. `-` reads one word a
     line (or word, tab, seconds) and answers each at once.
     """
+    from placerec.model import Decoding, decode_lines, format_beliefs, load_recognizer
     from placerec.model import decode as run
-    from placerec.model import decode_lines, format_beliefs, load_recognizer
 
+    try:
+        options = Decoding(transition, stay, per, max_gap, smooth, viterbi, lag)
+    except ModelError as error:
+        raise click.UsageError(str(error)) from error
     if tokens == (Path("-"),):
         if words or out:
             raise click.UsageError("`-` reads words and answers on stdout: it takes neither -w nor -o")
         if sys.stdin is None:
             raise click.UsageError("`-` reads standard input, and that is closed")
-        recognizer = load_recognizer(model, stay=stay, scorer=scorer)
+        if options.looks_ahead:
+            raise click.UsageError(
+                "`-` answers each line before later words are known: it takes none of --smooth, --viterbi, --lag"
+            )
+        recognizer = load_recognizer(model, options=options, scorer=scorer)
         for line in decode_lines(recognizer, sys.stdin, as_json=as_json):
             click.echo(line)
         return
@@ -78,7 +110,7 @@ def decode(
             words=words,
             out=out,
             format=format_,
-            stay=stay,
+            options=options,
             scorer=scorer,
             as_json=as_json,
             progress=progress,

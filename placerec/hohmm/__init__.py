@@ -1,21 +1,28 @@
 """Words and language models -> belief over places: the Bayesian filter of eq. 1."""
 
 from placerec.hohmm.beliefs import Beliefs, belief_rows, format_header, format_row, read_beliefs, write_beliefs
+from placerec.hohmm.emissions import Emissions, SeparateEmissions
 from placerec.hohmm.filter import Filtered, filter_stream
 from placerec.hohmm.recognizer import Belief, Recognizer
-from placerec.hohmm.transitions import Transition, fixed_transition
+from placerec.hohmm.transition_file import read_transitions
+from placerec.hohmm.transitions import PER, Transition, fixed_transition, learned_transition
 
 __all__ = [
+    "PER",
     "Belief",
     "Beliefs",
+    "Emissions",
     "Filtered",
     "Recognizer",
+    "SeparateEmissions",
     "Transition",
     "belief_rows",
     "filter_stream",
     "fixed_transition",
     "format_header",
     "format_row",
+    "learned_transition",
     "read_beliefs",
+    "read_transitions",
     "write_beliefs",
 ]

@@ -2,12 +2,15 @@
 
 from placerec.model.corpus import Corpus, read_corpus
 from placerec.model.decode import decode, decode_lines, format_beliefs
-from placerec.model.load import PlaceModels, load_model, load_recognizer, make_recognizer
+from placerec.model.decoding import Decoding, transition_of
+from placerec.model.load import PlaceModels, load_model
+from placerec.model.recognize import load_recognizer, make_recognizer
 from placerec.model.train import Options, estimate_place, parse_min_count, train_lm, train_model
 from placerec.model.update import update
 
 __all__ = [
     "Corpus",
+    "Decoding",
     "Options",
     "PlaceModels",
     "decode",
@@ -21,5 +24,6 @@ __all__ = [
     "read_corpus",
     "train_lm",
     "train_model",
+    "transition_of",
     "update",
 ]

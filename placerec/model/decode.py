@@ -10,7 +10,9 @@ from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
 from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, format_row
 from placerec.model.corpus import STREAM_SUFFIXES, dictionary_of, read_streams, stream_files
-from placerec.model.load import PlaceModels, load_model, make_recognizer
+from placerec.model.decoding import PAPER, Decoding
+from placerec.model.load import PlaceModels, load_model
+from placerec.model.recognize import make_recognizer
 from placerec.words import WordStream
 
 OWNED = ("*.tsv", "*.jsonl")
@@ -25,7 +27,7 @@ def decode(
     words: Path | str | None = None,
     out: Path | str | None = None,
     format: str = "auto",
-    stay: float = 0.99,
+    options: Decoding = PAPER,
     scorer: str = "native",
     as_json: bool = False,
     progress: Progress | None = None,
@@ -39,13 +41,14 @@ def decode(
     def decoded() -> list[Beliefs]:
         models = load_model(model)
         if words is None:
-            recognizer = make_recognizer(models, stay=stay, scorer=scorer)
+            recognizer = make_recognizer(models, options=options, scorer=scorer)
             streams = _token_streams(sources, models)
         else:
-            recognizer, streams = _image_streams(sources, Path(words), models, format, stay, scorer, progress)
+            recognizer, streams = _image_streams(sources, Path(words), models, format, options, scorer, progress)
         if out is None and len(streams) > 1:
             raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
-        return [recognizer.decode(stream) for stream in streams]
+        ahead = {"smooth": options.smooth, "viterbi": options.viterbi}
+        return [recognizer.decode(stream, **ahead, lag=options.lag) for stream in streams]
 
     if out is None:
         return decoded()
@@ -74,7 +77,7 @@ def _image_streams(
     words: Path,
     models: PlaceModels,
     format: str,
-    stay: float,
+    options: Decoding,
     scorer: str,
     progress: Progress | None,
 ) -> tuple[Recognizer, list[WordStream]]:
@@ -86,7 +89,7 @@ def _image_streams(
         if str(source).endswith(STREAM_SUFFIXES):
             raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
     dictionary = Dictionary.load(words)
-    recognizer = make_recognizer(models, stay=stay, scorer=scorer, dictionary=dictionary)
+    recognizer = make_recognizer(models, options=options, scorer=scorer, dictionary=dictionary)
     return recognizer, streams_of(sources, dictionary, format=format, progress=progress)
 
 
@@ -108,24 +111,26 @@ def decode_lines(recognizer: Recognizer, lines: Iterable[str], *, as_json: bool 
     """`placerec decode -`: an answer for each line `word` or `word TAB seconds`, as soon as it is read.
 
     The TSV header comes before the first line is read. A word that the models do not list holds the belief; the first
-    one and the number of them are logged. Raises StreamError for seconds that are no number.
+    one and the number of them are logged. Raises StreamError for seconds that are no number, and for those that are
+    needed (`Recognizer.update`) and missing, or go back.
     """
     if not as_json:
         yield format_header(recognizer.places)
     strange = 0
-    belief = recognizer.belief()
     for frame, line in enumerate(lines):
         word, time = _word_and_seconds(line, frame)
-        selected = False
-        if word in recognizer:
-            belief = recognizer.update(word, time)
-            selected = belief.selected
-        else:
-            if not strange:
-                log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
-            strange += 1
+        known = word in recognizer
+        if not known and not strange:
+            log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
+        strange += not known
+        try:
+            belief = recognizer.update(word, time) if known else recognizer.skip(time)
+        except ModelError as error:
+            raise StreamError(at("<stdin>", frame + 1, str(error))) from error
         probability = belief.probability.tolist()
-        yield _line(recognizer.places, str(frame), time, "", word, selected, belief.best, probability, as_json=as_json)
+        yield _line(
+            recognizer.places, str(frame), time, "", word, belief.selected, belief.best, probability, as_json=as_json
+        )
     if strange:
         log.warning("<stdin>: lines skipped because the models do not list their word: %d", strange)
     if recognizer.unexplained:

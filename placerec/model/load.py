@@ -1,22 +1,17 @@
-"""A MODEL/ folder, read back: a recognizer from its ARPA files."""
+"""A MODEL/ folder, read back."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from placerec.errors import ModelError, PlacerecError
 from placerec.files import read_text
 from placerec.frames.places import check_place
-from placerec.hohmm import Recognizer, fixed_transition
 from placerec.lm import BackoffModel, read_arpa
-from placerec.lm.external import kenlm_scorer
 from placerec.model.train import FORMAT
 from placerec.words import Selection, parse_selection
-
-if TYPE_CHECKING:
-    from placerec.vision import Dictionary
 
 
 @dataclass(frozen=True)
@@ -27,6 +22,12 @@ class PlaceModels:
     models: Mapping[str, BackoffModel] = field(repr=False)
     selection: Selection
     description: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def transitions(self) -> list[list[int]] | None:
+        """How often a frame in each place was followed by one in each place, C x C; None if that is not known."""
+        known = self.description.get("transitions")
+        return known["counts"] if known else None
 
 
 def load_model(path: Path | str) -> PlaceModels:
@@ -44,40 +45,6 @@ def load_model(path: Path | str) -> PlaceModels:
             raise ModelError(f"{arpa}: missing, though model.json lists the place {place!r}; train the model again")
         models[place] = read_arpa(arpa)
     return PlaceModels(path, models, parse_selection(description["select"]), description)
-
-
-def load_recognizer(
-    path: Path | str, *, stay: float = 0.99, dictionary: "Dictionary | None" = None, scorer: str = "native"
-) -> Recognizer:
-    """The recognizer of a MODEL/ folder.
-
-    `stay`: the probability of staying in a place at each selected word (p_e of the paper). `dictionary`: what turns
-    images into words. `scorer`: `native`, or `kenlm` (MissingExtraError where it is not installed). Raises ModelError
-    if the dictionary is not the one that made the training words.
-    """
-    return make_recognizer(load_model(path), stay=stay, dictionary=dictionary, scorer=scorer)
-
-
-def make_recognizer(
-    model: PlaceModels, *, stay: float = 0.99, dictionary: "Dictionary | None" = None, scorer: str = "native"
-) -> Recognizer:
-    """The recognizer of a model that is loaded; see `load_recognizer`."""
-    trained_on = model.description["dictionary"]
-    if dictionary is not None and trained_on is not None and dictionary.fingerprint != trained_on:
-        raise ModelError(
-            f"{model.path}: was trained on the words of another dictionary than the one given; "
-            "give the words.npz of its training, or train it again"
-        )
-    if scorer not in ("native", "kenlm"):
-        raise ModelError(f"scorer {scorer!r} is unknown; choose native or kenlm")
-    scorers = {place: kenlm_scorer(model.path / f"{place}.arpa") for place in model.models} if scorer == "kenlm" else {}
-    return Recognizer(
-        model.models,
-        selection=model.selection,
-        transition=fixed_transition(len(model.models), stay),
-        dictionary=dictionary,
-        scorers=scorers,
-    )
 
 
 def read_description(path: Path) -> dict[str, Any]:
@@ -99,8 +66,24 @@ def read_description(path: Path) -> dict[str, Any]:
             raise ModelError(f"{path}: place {place!r} {reason}; {remedy}")
     if dictionary is not None and not isinstance(dictionary, str):
         raise ModelError(f"{path}: 'dictionary' must be a fingerprint or null; {remedy}")
+    if (known := description.get("transitions")) is not None and not _are_counts(known, len(places)):
+        raise ModelError(
+            f"{path}: 'transitions' must be null or hold 'counts', {len(places)} rows of {len(places)} whole numbers "
+            f"from 0; {remedy}"
+        )
     try:
         parse_selection(str(description.get("select")))
     except PlacerecError as error:
         raise ModelError(f"{path}: {error}; {remedy}") from error
     return description
+
+
+def _are_counts(known: Any, places: int) -> bool:
+    """Whether this is {"counts": a C x C matrix of whole numbers from 0}."""
+    rows = known.get("counts") if isinstance(known, dict) else None
+    if not isinstance(rows, list) or len(rows) != places:
+        return False
+    return all(
+        isinstance(row, list) and len(row) == places and all(type(count) is int and count >= 0 for count in row)
+        for row in rows
+    )

@@ -108,8 +108,8 @@ def test_where_no_place_explains_the_word_the_prediction_is_kept() -> None:
 def test_bounds_of_the_prediction() -> None:
     # readings 1.3: after a prediction every place has at least (1 - p_e) / (C - 1), and none more than p_e.
     transition = fixed_transition(5, 0.99)
-    sure = np.log([1 - 4e-12, 1e-12, 1e-12, 1e-12, 1e-12])
-    predicted = np.exp(transition.predict(sure))
+    sure = np.array([1 - 4e-12, 1e-12, 1e-12, 1e-12, 1e-12])
+    predicted = sure @ transition.over(1)
     assert predicted.min() >= 0.0025 - 1e-12
     assert predicted.max() <= 0.99
 

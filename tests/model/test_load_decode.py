@@ -13,7 +13,16 @@ from small import PLACES, VOCABULARY, write_tokens
 
 from placerec.errors import LanguageModelError, ModelError, OutputError, PlacerecError, StreamError
 from placerec.hohmm import read_beliefs
-from placerec.model import Options, decode, decode_lines, format_beliefs, load_model, load_recognizer, train_lm
+from placerec.model import (
+    Decoding,
+    Options,
+    decode,
+    decode_lines,
+    format_beliefs,
+    load_model,
+    load_recognizer,
+    train_lm,
+)
 from placerec.words import Selection, parse_selection, read_stream
 
 
@@ -100,7 +109,7 @@ def test_unknown_scorers_and_probabilities_are_refused(world: Path) -> None:
         load_recognizer(world / "model", scorer="magic")
     for stay in (-0.1, 1.1, math.nan):
         with pytest.raises(ModelError, match="is not between 0 and 1"):
-            load_recognizer(world / "model", stay=stay)
+            load_recognizer(world / "model", options=Decoding(stay=stay))
 
 
 def test_decoding_writes_what_it_returns(world: Path) -> None:

@@ -1,0 +1,157 @@
+"""Transitions along one sequence: the prediction of eq. 1 at each of its updates, for whole arrays of beliefs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import exp, inf, log
+from operator import mul
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.hohmm.transitions import Transition, fade
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Predict = Callable[[list[float]], list[float]]
+# Where every place can be reached from every place with more than this, a belief that is kept as it is (not as its
+# logarithm) never loses what matters later: what underflows is 300 decades below what comes from the other places.
+MIXING = 1e-15
+
+
+class Motion(Protocol):
+    """The prediction at each of T updates."""
+
+    @property
+    def mixes(self) -> bool:
+        """Whether every prediction leaves every place more than MIXING."""
+
+    def predict(self, states: Floats, at: slice | Ints) -> Floats:
+        """States (..., C, m) one prediction later, at m of the T updates; each sum over C is kept, or its scale."""
+
+    def matrices(self, at: slice | Ints) -> Floats:
+        """The matrices (C, C, m) at m of the updates; the first index is the place before."""
+
+
+@dataclass(frozen=True)
+class Fading:
+    """All places change alike: every belief goes towards 1/C; `kept` and `spread` float64 (T,), which sum to 1."""
+
+    places: int
+    kept: Floats = field(repr=False)
+    spread: Floats = field(repr=False)
+
+    @property
+    def mixes(self) -> bool:
+        """As `Motion` has it."""
+        return not len(self.spread) or bool(self.spread.min() / self.places > MIXING)
+
+    def predict(self, states: Floats, at: slice | Ints) -> Floats:
+        """As `Motion` has it."""
+        predicted = states * self.kept[at]
+        predicted += (total(states) * (self.spread[at] / self.places))[..., None, :]
+        return predicted
+
+    def matrices(self, at: slice | Ints) -> Floats:
+        """As `Motion` has it."""
+        matrices: Floats = np.eye(self.places)[:, :, None] * self.kept[at] + self.spread[at] / self.places
+        return matrices
+
+
+@dataclass(frozen=True)
+class Tabled:
+    """Any transitions: the `tables` float64 (C, C, U) that occur, rows the place before; `which` int64 (T,) is used."""
+
+    tables: Floats = field(repr=False)
+    which: Ints = field(repr=False)
+
+    @cached_property
+    def mixes(self) -> bool:
+        """As `Motion` has it."""
+        return not len(self.which) or bool(self.tables.min() > MIXING)
+
+    def predict(self, states: Floats, at: slice | Ints) -> Floats:
+        """As `Motion` has it."""
+        tables = self.tables if self.tables.shape[2] == 1 else self.matrices(at)
+        predicted: Floats = states[..., 0, None, :] * tables[0]
+        for i in range(1, len(tables)):
+            predicted += states[..., i, None, :] * tables[i]
+        return predicted
+
+    def matrices(self, at: slice | Ints) -> Floats:
+        """As `Motion` has it."""
+        matrices: Floats = self.tables[:, :, self.which[at]]
+        return matrices
+
+
+def motion(transition: Transition, elapsed: Floats, *, backwards: bool = False) -> Motion:
+    """The predictions at T updates, each `elapsed` float64 (T,) steps after the one before.
+
+    `backwards`: of evidence from later updates to earlier ones, so with the transposed matrices.
+    """
+    if transition.change is not None:
+        return Fading(len(transition.matrix), *fade(transition.change, elapsed))
+    distinct, which = np.unique(elapsed, return_inverse=True)
+    C = len(transition.matrix)
+    tables = np.empty((C, C, len(distinct)))
+    for u, steps in enumerate(distinct.tolist()):
+        matrix = transition.over(steps)
+        tables[:, :, u] = matrix.T if backwards else matrix
+    return Tabled(tables, which.reshape(-1))
+
+
+def predict_logs(steps: Motion, logs: Floats, at: slice | Ints) -> Floats:
+    """`Motion.predict` for logarithms (C, m), right for any transitions."""
+    top = logs.max(axis=0)
+    top = np.where(np.isfinite(top), top, 0.0)
+    with np.errstate(divide="ignore"):
+        if steps.mixes:
+            predicted: Floats = np.log(steps.predict(np.exp(logs - top), at)) + top
+            return predicted
+        reached = logs[:, None] + np.log(steps.matrices(at))
+        highest = np.where(np.isfinite(reached.max(axis=0)), reached.max(axis=0), 0.0)
+        predicted = np.log(np.exp(reached - highest).sum(axis=0)) + highest
+    return predicted
+
+
+def total(states: Floats) -> Floats:
+    """The sum over places: (..., C, m) to (..., m); always in their order, so that m changes no last digit."""
+    sums = states[..., 0, :].copy()
+    for i in range(1, states.shape[-2]):
+        sums += states[..., i, :]
+    return sums
+
+
+def predictor(transition: Transition, steps: float) -> Predict:
+    """The prediction over `steps` steps for one log belief, plain floats in and out: what is fast on-line."""
+    if transition.change is not None:
+        kept, spread = (float(part[0]) for part in fade(transition.change, np.array([steps], np.float64)))
+        share = spread / len(transition.matrix)
+        if share > MIXING:
+            return lambda log_belief: [log(kept * exp(b) + share) for b in log_belief]
+    return matrix_predictor(transition.over(steps))
+
+
+def matrix_predictor(matrix: Floats) -> Predict:
+    """The same with a matrix (C, C)."""
+    columns: list[list[float]] = matrix.T.tolist()
+    if float(matrix.min()) > MIXING:
+        return lambda log_belief: _mixed([exp(b) for b in log_belief], columns)
+    logs = [[safe_log(p) for p in column] for column in columns]
+    return lambda log_belief: [log_sum([b + p for b, p in zip(log_belief, column, strict=True)]) for column in logs]
+
+
+def _mixed(belief: list[float], columns: list[list[float]]) -> list[float]:
+    return [log(sum(map(mul, belief, column))) for column in columns]
+
+
+def safe_log(p: float) -> float:
+    """The natural logarithm, -inf for 0."""
+    return log(p) if p > 0 else -inf
+
+
+def log_sum(logs: list[float]) -> float:
+    """log of the sum of exp(x), -inf if all are."""
+    top = max(logs)
+    return top + log(sum([exp(x - top) for x in logs])) if top > -inf else top

@@ -1,0 +1,51 @@
+"""What is believed of every frame of a sequence that is known to its end."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.hohmm import smoothing
+from placerec.hohmm.evidence import Evidence
+from placerec.hohmm.filter import filter_stream
+from placerec.hohmm.transitions import Transition
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def believe(
+    evidence: Evidence, transition: Transition, *, smooth: bool = False, lag: int | None = None
+) -> tuple[Floats, int]:
+    """The belief float64 (n, C) at every frame, and how many words no place explained.
+
+    By default that of the filter: from the words up to the frame. `smooth`: from all words. `lag`: from the words up
+    to that many frames later. A frame without a selected word is believed to be where the last frame with one was;
+    before the first one all places are equally probable.
+    """
+    log10_p, elapsed, frames = evidence.log10_p, evidence.elapsed, len(evidence.selected)
+    filtered = filter_stream(log10_p, transition, elapsed)
+    if lag is not None and lag < frames:
+        updates = evidence.updates
+        known = updates[np.minimum(np.arange(frames) + lag, frames - 1)]
+        started = updates > 0
+        belief = np.full((frames, log10_p.shape[1]), 1 / log10_p.shape[1])
+        if started.any():
+            belief[started] = smoothing.smooth_lagged(
+                log10_p, transition, elapsed, updates[started] - 1, known[started] - 1
+            )
+        return belief, filtered.unexplained
+    if smooth or lag is not None:
+        return hold(smoothing.smooth(log10_p, transition, elapsed), evidence), filtered.unexplained
+    return hold(filtered.belief, evidence), filtered.unexplained
+
+
+def most_probable_path(evidence: Evidence, transition: Transition) -> Ints:
+    """The number of each frame's place on the most probable path, int64 (n,); 0 before the first selected word."""
+    path = np.concatenate([[0], smoothing.viterbi(evidence.log10_p, transition, evidence.elapsed)])
+    places: Ints = path[evidence.updates]
+    return places
+
+
+def hold(belief: Floats, evidence: Evidence) -> Floats:
+    """Beliefs (U, C) of the selected words, held over the frames between them (readings A16): (n, C)."""
+    before = np.full((1, belief.shape[1]), 1 / belief.shape[1])
+    return np.concatenate([before, belief])[evidence.updates]

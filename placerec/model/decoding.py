@@ -1,0 +1,79 @@
+"""How a sequence is decoded: which transitions, what ends a sequence, and whether later words count."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from placerec.errors import ModelError
+from placerec.hohmm import Transition, fixed_transition, learned_transition, read_transitions
+from placerec.model.load import PlaceModels
+
+STAY, PER = 0.99, "update"
+
+
+@dataclass(frozen=True)
+class Decoding:
+    """The options of `decode`; every name is that of the command line. Without any: what the paper does.
+
+    `transition`: `fixed` (`stay` on the diagonal, the rest shared), `learned` (what the training counted, to the power
+    of the frames since the last update), or the path of a matrix (`read_transitions`). `stay`: None is 0.99. `per`:
+    what one step of the transitions is, an `update`, a `frame`, or a `second` of the stream's time; None is `update`.
+    `max_gap`: more seconds than this between two frames begin a new sequence. Of `smooth` (all words count), `lag`
+    (words up to so many frames later count) and `viterbi` (`best` is the most probable path) one at most. Raises
+    ModelError for options that exclude each other.
+    """
+
+    transition: str = "fixed"
+    stay: float | None = None
+    per: str | None = None
+    max_gap: float | None = None
+    smooth: bool = False
+    viterbi: bool = False
+    lag: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.transition == "learned" and (self.stay is not None or self.per is not None):
+            raise ModelError("learned transitions are per frame: they take neither a stay probability nor `per`")
+        if self.transition not in ("fixed", "learned"):
+            if self.stay is not None:
+                raise ModelError(f"{self.transition}: transitions of a file take no stay probability")
+            if self.per == "second":
+                raise ModelError(
+                    f"{self.transition}: transitions of a file cannot be per second, since a matrix has no power for a "
+                    "part of a second; choose update or frame"
+                )
+        if self.max_gap is not None and not self.max_gap > 0:
+            raise ModelError(f"largest gap {self.max_gap:g} s is not above 0")
+        if self.lag is not None and self.lag < 0:
+            raise ModelError(f"lag {self.lag} is below 0")
+        if self.smooth + self.viterbi + (self.lag is not None) > 1:
+            raise ModelError("of smooth, viterbi and lag only one can be asked for")
+
+    @property
+    def looks_ahead(self) -> bool:
+        """Whether words count that come later."""
+        return self.smooth or self.viterbi or self.lag is not None
+
+
+# The paper's: the place stays with probability 0.99 at each selected word.
+PAPER = Decoding()
+
+
+def transition_of(model: PlaceModels, options: Decoding) -> Transition:
+    """The transitions that `options` ask for between the places of `model`.
+
+    Raises ModelError if the model has no counts to learn from, for a file that cannot be read, or a probability that
+    is none.
+    """
+    per = options.per or PER
+    if options.transition == "fixed":
+        return fixed_transition(len(model.models), STAY if options.stay is None else options.stay, per)
+    if options.transition == "learned":
+        if model.transitions is None:
+            raise ModelError(
+                f"{model.path}: holds no counts of steps between places: it was trained on sentences, which have none, "
+                "or by an older placerec; train it again on token streams, or choose fixed transitions"
+            )
+        return learned_transition(model.transitions)
+    if not Path(options.transition).exists():
+        raise ModelError(f"{options.transition}: no such file; transitions are fixed, learned, or a file")
+    return Transition(read_transitions(options.transition, tuple(model.models)), per)

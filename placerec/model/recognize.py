@@ -1,0 +1,60 @@
+"""The recognizer of a MODEL/ folder."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from placerec.errors import ModelError
+from placerec.hohmm import Recognizer, SeparateEmissions
+from placerec.lm.external import kenlm_scorer
+from placerec.model.decoding import PAPER, Decoding, transition_of
+from placerec.model.load import PlaceModels, load_model
+
+if TYPE_CHECKING:
+    from placerec.vision import Dictionary
+
+
+def load_recognizer(
+    path: Path | str,
+    *,
+    options: Decoding = PAPER,
+    dictionary: "Dictionary | None" = None,
+    scorer: str = "native",
+) -> Recognizer:
+    """The recognizer of a MODEL/ folder.
+
+    `options`: its transitions, and what ends a sequence. `dictionary`: what turns images into words. `scorer`:
+    `native`, or `kenlm` (MissingExtraError where it is not installed). Raises ModelError if the dictionary is not the
+    one that made the training words, and as `transition_of` does.
+    """
+    return make_recognizer(load_model(path), options=options, dictionary=dictionary, scorer=scorer)
+
+
+def make_recognizer(
+    model: PlaceModels,
+    *,
+    options: Decoding = PAPER,
+    dictionary: "Dictionary | None" = None,
+    scorer: str = "native",
+) -> Recognizer:
+    """The recognizer of a model that is loaded; see `load_recognizer`."""
+    trained_on = model.description["dictionary"]
+    if dictionary is not None and trained_on is not None and dictionary.fingerprint != trained_on:
+        raise ModelError(
+            f"{model.path}: was trained on the words of another dictionary than the one given; "
+            "give the words.npz of its training, or train it again"
+        )
+    if scorer not in ("native", "kenlm"):
+        raise ModelError(f"scorer {scorer!r} is unknown; choose native or kenlm")
+    return Recognizer(
+        model.models,
+        selection=model.selection,
+        transition=transition_of(model, options),
+        dictionary=dictionary,
+        max_gap=options.max_gap,
+        emissions=_kenlm(model) if scorer == "kenlm" else None,
+    )
+
+
+def _kenlm(model: PlaceModels) -> SeparateEmissions:
+    scorers = [kenlm_scorer(model.path / f"{place}.arpa") for place in model.models]
+    return SeparateEmissions(scorers, max(one.order for one in model.models.values()))
