@@ -94,55 +94,77 @@ def _scan(log10_p: Floats, steps: Motion) -> Filtered:
     each other; the second pass fills the blocks.
     """
     T, C = log10_p.shape
-    top = log10_p.max(axis=1)
-    explained = top > -np.inf
-    belief = np.empty((C, T))
+    belief, explained = np.empty((T, C)), np.empty(T, bool)
+    first, explained[:1] = _weigh(log10_p[:1].T.copy())
+    belief[0] = first[:, 0] / first[:, 0].sum()
     together = BLOCK * max(1, SIDE_BY_SIDE // C**2)
-    state = np.empty(C)
-    for start in range(0, T, together):
-        stop = min(start + together, T)
-        known = explained[start:stop, None]
-        with np.errstate(invalid="ignore"):
-            weight = np.where(known, np.exp((log10_p[start:stop] - top[start:stop, None]) * LN10), 1.0)
-        weight = np.ascontiguousarray(weight.T)
-        if start == 0:
-            state = weight[:, 0] / weight[:, 0].sum()
-            belief[:, 0] = state
-            start, weight = 1, weight[:, 1:]
-        state = _scan_blocks(weight, steps, start - 1, state, belief[:, start:stop])
-    return Filtered(np.ascontiguousarray(belief.T), explained)
+    for start in range(1, T, together):
+        words = slice(start, min(start + together, T))
+        n = words.stop - start
+        weight, known = _weigh(_side_by_side(log10_p[words]))
+        explained[words] = known.T.reshape(-1)[:n]
+        belief[words] = _fill(weight, steps, start - 1, n, belief[start - 1])
+    return Filtered(belief, explained)
 
 
-def _scan_blocks(weight: Floats, steps: Motion, first: int, state: Floats, belief: Floats) -> Floats:
-    """Fill `belief` (C, n) of n words with `weight` (C, n), whose predictions are `first`... of `steps`.
+def _side_by_side(rows: Floats) -> Floats:
+    """A copy of rows (n, C) as float64 (BLOCK, C, blocks), the last block filled up."""
+    blocks = -(-len(rows) // BLOCK)
+    if len(rows) < blocks * BLOCK:
+        rows = np.concatenate([rows, np.zeros((blocks * BLOCK - len(rows), rows.shape[1]))])
+    return rows.reshape(blocks, BLOCK, -1).transpose(1, 2, 0).copy()
 
-    `state` (C,): the belief before them; what is returned is the one after them.
+
+def _weigh(logs: Floats) -> tuple[Floats, Mask]:
+    """Of log10 p (..., C, m): probabilities in proportion, the largest 1, and where (..., m) there is any above 0.
+
+    Where there is none all are 1. The argument is overwritten.
     """
-    C, n = weight.shape
-    if not n:
-        return state
-    starts = np.empty((C, -(-n // BLOCK)))
-    starts[:, 0] = state
-    operators = _operators(weight[:, : n // BLOCK * BLOCK], steps, first)
-    for block in range(1, starts.shape[1]):
-        after = total(starts[:, block - 1, None] * operators[:, :, block - 1])
-        starts[:, block] = after / after.sum()
-    states = starts
-    for s in range(min(BLOCK, n)):
-        here = weight[:, s::BLOCK]
+    top = logs.max(axis=-2)
+    explained = top > -np.inf
+    logs -= np.where(explained, top, 0.0)[..., None, :]
+    if not explained.all():
+        logs[...] = np.where(explained[..., None, :], logs, 0.0)
+    logs *= LN10
+    return np.exp(logs, out=logs), explained
+
+
+def _fill(weight: Floats, steps: Motion, first: int, n: int, state: Floats) -> Floats:
+    """Beliefs (n, C) after n words with `weight` (BLOCK, C, blocks), whose predictions are `first`... of `steps`.
+
+    `state` (C,): the belief before them.
+    """
+    B, C, blocks = weight.shape
+    states = np.empty((C, blocks))
+    states[:, 0] = state
+    operators = _operators(weight[:, :, : blocks - 1], steps, first)
+    for block, operator in enumerate(np.ascontiguousarray(operators.transpose(2, 0, 1)), start=1):
+        # Not BLAS, whose sums depend on the number of its threads.
+        state = np.einsum("i,ij->j", state, operator)
+        states[:, block] = state = state / state.sum()
+    for s in range(min(B, n)):
+        at = slice(first + s, first + n, B)
         # The last block may be shorter than the others.
-        states = steps.predict(states[:, : here.shape[1]], slice(first + s, first + n, BLOCK)) * here
+        states = states[:, : -(-(n - s) // B)]
+        steps.advance(states, at)
+        states *= weight[s, :, : states.shape[1]]
         states /= total(states)
-        belief[:, s::BLOCK] = states
-    return belief[:, -1]
+        weight[s, :, : states.shape[1]] = states
+    return weight.transpose(2, 0, 1).reshape(-1, C)[:n]
 
 
 def _operators(weight: Floats, steps: Motion, first: int) -> Floats:
-    """What each block of words makes of a belief that is all in one place: float64 (C before, C after, blocks)."""
-    C, n = weight.shape
-    operators = np.repeat(np.eye(C)[:, :, None], n // BLOCK, axis=2)
-    for s in range(min(BLOCK, n)):
-        operators = steps.predict(operators, slice(first + s, first + n, BLOCK)) * weight[:, s::BLOCK]
+    """What blocks of words make of a belief that is all in one place: (C before, C after, blocks).
+
+    `weight` (B, C, blocks); arguments as of `_fill`.
+    """
+    B, C, blocks = weight.shape
+    operators = np.repeat(np.eye(C)[:, :, None], blocks, axis=2)
+    if not blocks:
+        return operators
+    for s in range(B):
+        steps.advance(operators, slice(first + s, first + blocks * B, B))
+        operators *= weight[s]
         if s % UNSCALED == UNSCALED - 1:
             operators /= operators.max(axis=(0, 1))
     return operators

@@ -27,8 +27,8 @@ class Motion(Protocol):
     def mixes(self) -> bool:
         """Whether every prediction leaves every place more than MIXING."""
 
-    def predict(self, states: Floats, at: slice | Ints) -> Floats:
-        """States (..., C, m) one prediction later, at m of the T updates; each sum over C is kept, or its scale."""
+    def advance(self, states: Floats, at: slice | Ints) -> None:
+        """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
 
     def matrices(self, at: slice | Ints) -> Floats:
         """The matrices (C, C, m) at m of the updates; the first index is the place before."""
@@ -36,22 +36,29 @@ class Motion(Protocol):
 
 @dataclass(frozen=True)
 class Fading:
-    """All places change alike: every belief goes towards 1/C; `kept` and `spread` float64 (T,), which sum to 1."""
+    """All places change alike: every belief goes towards 1/C; `kept` and `spread` float64 (T,), which sum to 1.
+
+    `even`: they are the same for all updates.
+    """
 
     places: int
     kept: Floats = field(repr=False)
     spread: Floats = field(repr=False)
+    even: bool
 
     @property
     def mixes(self) -> bool:
         """As `Motion` has it."""
         return not len(self.spread) or bool(self.spread.min() / self.places > MIXING)
 
-    def predict(self, states: Floats, at: slice | Ints) -> Floats:
+    def advance(self, states: Floats, at: slice | Ints) -> None:
         """As `Motion` has it."""
-        predicted = states * self.kept[at]
-        predicted += (total(states) * (self.spread[at] / self.places))[..., None, :]
-        return predicted
+        # One number for all updates is ten times cheaper than a column of equal ones.
+        kept, spread = (self.kept[:1], self.spread[:1]) if self.even else (self.kept[at], self.spread[at])
+        shared = total(states)
+        shared *= spread / self.places
+        states *= kept
+        states += shared[..., None, :]
 
     def matrices(self, at: slice | Ints) -> Floats:
         """As `Motion` has it."""
@@ -71,13 +78,15 @@ class Tabled:
         """As `Motion` has it."""
         return not len(self.which) or bool(self.tables.min() > MIXING)
 
-    def predict(self, states: Floats, at: slice | Ints) -> Floats:
+    def advance(self, states: Floats, at: slice | Ints) -> None:
         """As `Motion` has it."""
         tables = self.tables if self.tables.shape[2] == 1 else self.matrices(at)
-        predicted: Floats = states[..., 0, None, :] * tables[0]
+        before = states.copy()
+        np.multiply(before[..., 0, None, :], tables[0], out=states)
+        product = np.empty_like(states)
         for i in range(1, len(tables)):
-            predicted += states[..., i, None, :] * tables[i]
-        return predicted
+            np.multiply(before[..., i, None, :], tables[i], out=product)
+            states += product
 
     def matrices(self, at: slice | Ints) -> Floats:
         """As `Motion` has it."""
@@ -91,7 +100,11 @@ def motion(transition: Transition, elapsed: Floats, *, backwards: bool = False) 
     `backwards`: of evidence from later updates to earlier ones, so with the transposed matrices.
     """
     if transition.change is not None:
-        return Fading(len(transition.matrix), *fade(transition.change, elapsed))
+        even = bool((elapsed[:1] == elapsed).all())
+        kept, spread = fade(transition.change, elapsed[:1] if even else elapsed)
+        return Fading(
+            len(transition.matrix), np.broadcast_to(kept, elapsed.shape), np.broadcast_to(spread, elapsed.shape), even
+        )
     distinct, which = np.unique(elapsed, return_inverse=True)
     C = len(transition.matrix)
     tables = np.empty((C, C, len(distinct)))
@@ -102,16 +115,17 @@ def motion(transition: Transition, elapsed: Floats, *, backwards: bool = False) 
 
 
 def predict_logs(steps: Motion, logs: Floats, at: slice | Ints) -> Floats:
-    """`Motion.predict` for logarithms (C, m), right for any transitions."""
+    """The prediction for logarithms (C, m), right for any transitions."""
     top = logs.max(axis=0)
     top = np.where(np.isfinite(top), top, 0.0)
     with np.errstate(divide="ignore"):
         if steps.mixes:
-            predicted: Floats = np.log(steps.predict(np.exp(logs - top), at)) + top
-            return predicted
+            states: Floats = np.exp(logs - top)
+            steps.advance(states, at)
+            return np.log(states) + top
         reached = logs[:, None] + np.log(steps.matrices(at))
         highest = np.where(np.isfinite(reached.max(axis=0)), reached.max(axis=0), 0.0)
-        predicted = np.log(np.exp(reached - highest).sum(axis=0)) + highest
+        predicted: Floats = np.log(np.exp(reached - highest).sum(axis=0)) + highest
     return predicted
 
 

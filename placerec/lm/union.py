@@ -17,7 +17,9 @@ from placerec.lm.trie import Ints, Trie, Vocabulary, build_trie, endings, runs
 
 Floats = NDArray[np.float64]
 # Words that are looked up together: the work space stays in cache, and memory does not grow with the text.
-CHUNK = 1 << 15
+CHUNK = 1 << 16
+# Up to so many possible n-grams of one order a table of them all finds a row; beyond, a hash table.
+DIRECT = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -47,32 +49,46 @@ class ModelUnion:
 
     def _score(self, ids: Ints) -> Floats:
         """log10 p (t, C) of word numbers (t,); the first word has no context."""
-        rows = [ids]
+        row, best, answered = ids, ids.copy(), np.ones(len(ids), np.int8)
+        contexts = []
         for n in range(2, self.trie.order + 1):
-            wanted = np.full(len(ids), -1, np.int64)
-            wanted[1:] = rows[-1][:-1] * len(self.trie.vocabulary) + ids[1:]
-            rows.append(self._indices[n - 2].find(wanted))
-        scores = np.empty((len(ids), self.log10_p[0].shape[1]))
-        left = np.arange(len(ids))
-        unanswered = []
-        for n in range(self.trie.order, 0, -1):
-            row = rows[n - 1][left]
-            answered = left[row >= 0]
-            scores[answered] = self.log10_p[n - 1][rows[n - 1][answered]]
-            left = left[row < 0]
-            unanswered.append(left)
-        for k in range(1, self.trie.order):
-            # Words that only a context shorter than k words answers pay for each of their longer contexts.
-            at = unanswered[self.trie.order - 1 - k]
-            at = at[at > 0]
-            context = rows[k - 1][at - 1]
-            at, context = at[context >= 0], context[context >= 0]
-            scores[at] += self.backoff[k - 1][context]
+            context = np.full(len(ids), -1, np.int64)
+            context[1:] = row[:-1]
+            contexts.append(context)
+            known = np.flatnonzero(context >= 0)
+            row = np.full(len(ids), -1, np.int64)
+            row[known] = self._find[n - 2](context[known] * len(self.trie.vocabulary) + ids[known])
+            found = row >= 0
+            np.copyto(best, row + self._starts[n - 1], where=found)
+            np.copyto(answered, np.int8(n), where=found)
+        scores = self._all_log10_p.take(best, axis=0)
+        for k, context in enumerate(contexts, start=1):
+            # Words that only a shorter context answers pay for this one; -1 is the row of those that do not.
+            context[answered > k] = -1
+            scores += self._padded_backoff[k - 1].take(context, axis=0)
         return scores
 
     @cached_property
-    def _indices(self) -> list[RowIndex]:
-        return [RowIndex(keys) for keys in self.trie.keys[1:]]
+    def _starts(self) -> Ints:
+        """Where the rows of each order begin in `_all_log10_p`."""
+        return np.cumsum([0] + [len(keys) for keys in self.trie.keys])
+
+    @cached_property
+    def _all_log10_p(self) -> Floats:
+        return np.concatenate(self.log10_p)
+
+    @cached_property
+    def _padded_backoff(self) -> list[Floats]:
+        return [np.concatenate([weights, np.zeros((1, weights.shape[1]))]) for weights in self.backoff]
+
+    @cached_property
+    def _find(self) -> list[Callable[[Ints], Ints]]:
+        """Per order from 2 what finds the rows of keys."""
+        sizes = [len(keys) * len(self.trie.vocabulary) for keys in self.trie.keys]
+        return [
+            _direct(keys, size) if size <= DIRECT else RowIndex(keys).find
+            for keys, size in zip(self.trie.keys[1:], sizes[:-1], strict=True)
+        ]
 
     def follow(self) -> Callable[[str], list[float]]:
         """A function to be asked for each word of a text in turn: its C values of `score`; KeyError as there.
@@ -104,6 +120,13 @@ class ModelUnion:
             return scores
 
         return score
+
+
+def _direct(keys: Ints, size: int) -> Callable[[Ints], Ints]:
+    """What finds the places of keys below `size` by a table of all of them."""
+    table = np.full(size, -1, np.int64)
+    table[keys] = np.arange(len(keys))
+    return table.take
 
 
 def unite_models(models: Sequence[BackoffModel]) -> ModelUnion:
