@@ -1,0 +1,161 @@
+"""The options of decoding: what they do to the beliefs of files and streams, and which exclude each other."""
+
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small import PLACES, write_tokens
+
+from placerec.errors import ModelError, StreamError
+from placerec.hohmm import fixed_transition, learned_transition
+from placerec.model import Decoding, Options, decode, decode_lines, load_model, load_recognizer, train_lm, transition_of
+from placerec.words import parse_selection, read_stream
+
+COUNTS = [[90, 10, 0], [5, 80, 5], [0, 20, 70]]
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Path:
+    """Tokens of three runs, and a model of the first two that says how the place changed in training."""
+    write_tokens(tmp_path / "tokens")
+    options = Options(select=parse_selection("unique"))
+    train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model", options=options)
+    path = tmp_path / "model/model.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"transitions": {"counts": COUNTS}}))
+    return tmp_path
+
+
+def belief(world: Path, options: Decoding) -> np.ndarray[Any, np.dtype[np.float64]]:
+    (found,) = decode([world / "tokens/run3.tsv"], world / "model", options=options)
+    return found.belief
+
+
+def test_without_options_it_is_the_paper(world: Path) -> None:
+    paper = Decoding(transition="fixed", stay=0.99, per="update")
+    assert np.array_equal(belief(world, Decoding()), belief(world, paper))
+    assert not np.allclose(belief(world, Decoding()), belief(world, Decoding(stay=0.9)))
+
+
+def test_learned_transitions_are_those_of_the_training(world: Path) -> None:
+    model = load_model(world / "model")
+    learned = transition_of(model, Decoding(transition="learned"))
+    assert learned.per == "frame"
+    assert np.array_equal(learned.matrix, learned_transition(COUNTS).matrix)
+    rows = "\n".join("\t".join(repr(p) for p in row) for row in learned.matrix.tolist())
+    (world / "steps.tsv").write_text("\t".join(PLACES) + "\n" + rows)
+    from_file = Decoding(transition=str(world / "steps.tsv"), per="frame")
+    expected = belief(world, Decoding(transition="learned"))
+    assert belief(world, from_file) == pytest.approx(expected, abs=1e-12)
+    assert not np.allclose(belief(world, Decoding(transition=from_file.transition)), expected)
+
+
+@pytest.mark.parametrize("known", [{}, {"transitions": None}])
+def test_a_model_without_counts_cannot_have_learned(world: Path, known: dict[str, None]) -> None:
+    path = world / "model/model.json"
+    description = json.loads(path.read_text())
+    del description["transitions"]
+    path.write_text(json.dumps(description | known))
+    belief(world, Decoding())
+    with pytest.raises(ModelError, match=r"model: holds no counts of steps between places: .*; train it again"):
+        belief(world, Decoding(transition="learned"))
+
+
+def test_a_file_that_is_not_there_is_named(world: Path) -> None:
+    with pytest.raises(ModelError, match=r"^leraned: no such file; transitions are fixed, learned, or a file"):
+        belief(world, Decoding(transition="leraned"))
+
+
+def test_per_second_follows_the_clock(world: Path) -> None:
+    # The frames of the small world are half a second apart.
+    seconds = belief(world, Decoding(stay=0.9, per="second"))
+    half = fixed_transition(3, 0.9, "second").over(0.5)
+    assert belief(world, Decoding(stay=float(half[0, 0]), per="frame")) == pytest.approx(seconds, abs=1e-12)
+    (world / "plain.txt").write_text("w01 w02")
+    for options in (Decoding(per="second"), Decoding(max_gap=1)):
+        with pytest.raises(StreamError, match=r"^plain: frame '0' has no time, which "):
+            decode([world / "plain.txt"], world / "model", options=options)
+
+
+def test_a_gap_ends_a_sequence(world: Path) -> None:
+    whole = (world / "tokens/run3.tsv").read_text().splitlines()
+    later = [line.split("\t") for line in whole[31:]]
+    moved = ["\t".join([name, str(float(time) + 60), *rest]) for name, time, *rest in later]
+    (world / "gap.tsv").write_text("\n".join([*whole[:31], *moved]) + "\n")
+    (world / "late.tsv").write_text("\n".join([whole[0], *moved]) + "\n")
+    (gap,) = decode([world / "gap.tsv"], world / "model", options=Decoding(max_gap=30))
+    (late,) = decode([world / "late.tsv"], world / "model")
+    assert np.array_equal(gap.belief[30:], late.belief)
+    assert np.array_equal(gap.belief[:30], belief(world, Decoding())[:30])
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        Decoding(),
+        Decoding(stay=0.8, per="frame"),
+        Decoding(stay=0.8, per="second", max_gap=0.6),
+        Decoding(transition="learned"),
+    ],
+)
+def test_a_stream_is_answered_as_the_file_is(world: Path, options: Decoding) -> None:
+    stream = read_stream(world / "tokens/run3.tsv")
+    # A word that the models do not list and a blank line, with a gap before them.
+    words = [*stream.words, "zz", "", *stream.words[:9]]
+    times = np.arange(len(words)) / 2 + np.where(np.arange(len(words)) > 40, 5.0, 0.0)
+    rows = zip(words, times.tolist(), strict=True)
+    lines = list(
+        decode_lines(
+            load_recognizer(world / "model", options=options),
+            io.StringIO("".join(f"{word}\t{time}\n" for word, time in rows)),
+        )
+    )
+    table = "".join(f"{word or 'yy'}\t{time}\n" for word, time in zip(words, times.tolist(), strict=True))
+    (world / "run.tsv").write_text("word\ttime\n" + table)
+    (batch,) = decode([world / "run.tsv"], world / "model", options=options)
+    online = np.array([[float(cell) for cell in line.split("\t")[6:]] for line in lines[1:]])
+    assert online == pytest.approx(batch.belief, abs=1e-8)
+
+
+def test_a_stream_without_its_times_is_refused_by_line(world: Path) -> None:
+    recognizer = load_recognizer(world / "model", options=Decoding(per="second"))
+    with pytest.raises(StreamError, match=r"^<stdin>:2: the frame has no time, which "):
+        list(decode_lines(recognizer, io.StringIO("w01\t1\nw02\n")))
+    recognizer.reset()
+    with pytest.raises(StreamError, match=r"^<stdin>:2: time goes back from 2\.000000 to 1\.000000 s"):
+        list(decode_lines(recognizer, io.StringIO("w01\t2\nw02\t1\n")))
+
+
+def test_later_words_count_when_they_are_asked_to(world: Path) -> None:
+    (plain,) = decode([world / "tokens/run3.tsv"], world / "model")
+    (path,) = decode([world / "tokens/run3.tsv"], world / "model", options=Decoding(viterbi=True))
+    assert np.array_equal(path.belief, plain.belief)
+    assert path.best != plain.best
+    smoothed, lagged = belief(world, Decoding(smooth=True)), belief(world, Decoding(lag=5))
+    assert np.array_equal(belief(world, Decoding(lag=0)).argmax(axis=1), plain.belief.argmax(axis=1))
+    assert belief(world, Decoding(lag=60)) == pytest.approx(smoothed, abs=1e-12)
+    assert not np.allclose(smoothed, lagged)
+    assert not np.allclose(plain.belief, lagged)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"transition": "learned", "stay": 0.9}, "learned transitions are per frame: they take neither"),
+        ({"transition": "learned", "per": "frame"}, "learned transitions are per frame: they take neither"),
+        ({"transition": "a.tsv", "stay": 0.9}, "a.tsv: transitions of a file take no stay probability"),
+        ({"transition": "a.tsv", "per": "second"}, "a.tsv: transitions of a file cannot be per second"),
+        ({"max_gap": 0.0}, "largest gap 0 s is not above 0"),
+        ({"max_gap": float("nan")}, "largest gap nan s is not above 0"),
+        ({"lag": -1}, "lag -1 is below 0"),
+        ({"smooth": True, "viterbi": True}, "of smooth, viterbi and lag only one can be asked for"),
+        ({"smooth": True, "lag": 0}, "of smooth, viterbi and lag only one can be asked for"),
+        ({"viterbi": True, "lag": 3}, "of smooth, viterbi and lag only one can be asked for"),
+    ],
+)
+def test_options_that_exclude_each_other(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ModelError, match=re.escape(message)):
+        Decoding(**options)
