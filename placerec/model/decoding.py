@@ -6,6 +6,7 @@ from pathlib import Path
 from placerec.errors import ModelError
 from placerec.hohmm import Transition, fixed_transition, learned_transition, read_transitions
 from placerec.model.load import PlaceModels
+from placerec.model.record import read_record
 
 STAY, PER = 0.99, "update"
 
@@ -68,12 +69,13 @@ def transition_of(model: PlaceModels, options: Decoding) -> Transition:
     if options.transition == "fixed":
         return fixed_transition(len(model.models), STAY if options.stay is None else options.stay, per)
     if options.transition == "learned":
-        if model.transitions is None:
+        counts = read_record(model.path / "model.json", model.description).transitions
+        if counts is None:
             raise ModelError(
-                f"{model.path}: holds no counts of steps between places: it was trained on sentences, which have none, "
-                "or by an older placerec; train it again on token streams, or choose fixed transitions"
+                f"{model.path}: was trained on sentences, which do not tell how often a place follows another; "
+                "train it on token streams, or choose fixed transitions"
             )
-        return learned_transition(model.transitions)
+        return learned_transition(counts)
     if not Path(options.transition).exists():
         raise ModelError(f"{options.transition}: no such file; transitions are fixed, learned, or a file")
     return Transition(read_transitions(options.transition, tuple(model.models)), per)

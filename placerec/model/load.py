@@ -23,12 +23,6 @@ class PlaceModels:
     selection: Selection
     description: Mapping[str, Any] = field(repr=False)
 
-    @property
-    def transitions(self) -> list[list[int]] | None:
-        """How often a frame in each place was followed by one in each place, C x C; None if that is not known."""
-        known = self.description.get("transitions")
-        return known["counts"] if known else None
-
 
 def load_model(path: Path | str) -> PlaceModels:
     """Read a MODEL/ folder; ModelError or LanguageModelError, naming the file, for anything missing or broken."""
@@ -66,24 +60,8 @@ def read_description(path: Path) -> dict[str, Any]:
             raise ModelError(f"{path}: place {place!r} {reason}; {remedy}")
     if dictionary is not None and not isinstance(dictionary, str):
         raise ModelError(f"{path}: 'dictionary' must be a fingerprint or null; {remedy}")
-    if (known := description.get("transitions")) is not None and not _are_counts(known, len(places)):
-        raise ModelError(
-            f"{path}: 'transitions' must be null or hold 'counts', {len(places)} rows of {len(places)} whole numbers "
-            f"from 0; {remedy}"
-        )
     try:
         parse_selection(str(description.get("select")))
     except PlacerecError as error:
         raise ModelError(f"{path}: {error}; {remedy}") from error
     return description
-
-
-def _are_counts(known: Any, places: int) -> bool:
-    """Whether this is {"counts": a C x C matrix of whole numbers from 0}."""
-    rows = known.get("counts") if isinstance(known, dict) else None
-    if not isinstance(rows, list) or len(rows) != places:
-        return False
-    return all(
-        isinstance(row, list) and len(row) == places and all(type(count) is int and count >= 0 for count in row)
-        for row in rows
-    )

@@ -15,17 +15,13 @@ from placerec.hohmm import fixed_transition, learned_transition
 from placerec.model import Decoding, Options, decode, decode_lines, load_model, load_recognizer, train_lm, transition_of
 from placerec.words import parse_selection, read_stream
 
-COUNTS = [[90, 10, 0], [5, 80, 5], [0, 20, 70]]
-
 
 @pytest.fixture
 def world(tmp_path: Path) -> Path:
-    """Tokens of three runs, and a model of the first two that says how the place changed in training."""
+    """Tokens of three runs, and a model of the first two."""
     write_tokens(tmp_path / "tokens")
     options = Options(select=parse_selection("unique"))
     train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model", options=options)
-    path = tmp_path / "model/model.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"transitions": {"counts": COUNTS}}))
     return tmp_path
 
 
@@ -44,7 +40,8 @@ def test_learned_transitions_are_those_of_the_training(world: Path) -> None:
     model = load_model(world / "model")
     learned = transition_of(model, Decoding(transition="learned"))
     assert learned.per == "frame"
-    assert np.array_equal(learned.matrix, learned_transition(COUNTS).matrix)
+    # Two runs, each with two visits of ten frames to each place in turn.
+    assert np.array_equal(learned.matrix, learned_transition([[36, 4, 0], [0, 36, 4], [2, 0, 36]]).matrix)
     rows = "\n".join("\t".join(repr(p) for p in row) for row in learned.matrix.tolist())
     (world / "steps.tsv").write_text("\t".join(PLACES) + "\n" + rows)
     from_file = Decoding(transition=str(world / "steps.tsv"), per="frame")
@@ -53,15 +50,22 @@ def test_learned_transitions_are_those_of_the_training(world: Path) -> None:
     assert not np.allclose(belief(world, Decoding(transition=from_file.transition)), expected)
 
 
-@pytest.mark.parametrize("known", [{}, {"transitions": None}])
-def test_a_model_without_counts_cannot_have_learned(world: Path, known: dict[str, None]) -> None:
+def test_a_model_that_did_not_see_sequences_cannot_have_learned(world: Path) -> None:
     path = world / "model/model.json"
+    train_lm([world / "model/sentences"], world / "other", vocabulary=world / "tokens/vocab.txt")
+    learned = Decoding(transition="learned")
+    with pytest.raises(ModelError, match=r"other: was trained on sentences, .*; train it on token streams, or "):
+        decode([world / "tokens/run3.tsv"], world / "other", options=learned)
     description = json.loads(path.read_text())
+    for broken in ({"counts": [[1, 2], [3, 4]]}, {"counts": [[1, 2, -3]] * 3}, 7, None):
+        path.write_text(json.dumps(description | {"transitions": broken}))
+        belief(world, Decoding())
+        with pytest.raises(ModelError, match=r"model\.json: does not say .*; train the model again"):
+            belief(world, learned)
     del description["transitions"]
-    path.write_text(json.dumps(description | known))
-    belief(world, Decoding())
-    with pytest.raises(ModelError, match=r"model: holds no counts of steps between places: .*; train it again"):
-        belief(world, Decoding(transition="learned"))
+    path.write_text(json.dumps(description))
+    with pytest.raises(ModelError, match=r"model\.json: does not say .*; train the model again"):
+        belief(world, learned)
 
 
 def test_a_file_that_is_not_there_is_named(world: Path) -> None:

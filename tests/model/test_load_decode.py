@@ -82,12 +82,6 @@ def test_missing_or_broken_model_files_are_named(world: Path) -> None:
         ({"places": ["/hall"]}, "place '/hall' holds a /"),
         ({"select": 7}, "selection '7' is unknown"),
         ({"dictionary": 7}, "'dictionary' must be a fingerprint or null"),
-        ({"transitions": 7}, "'transitions' must be null or hold 'counts', 3 rows of 3 whole numbers from 0"),
-        ({"transitions": {}}, "'transitions' must be null or hold 'counts'"),
-        ({"transitions": {"counts": [[1, 2], [3, 4]]}}, "'transitions' must be null or hold 'counts'"),
-        ({"transitions": {"counts": [[1, 2, 3], [1, 2, 3], [1, 2]]}}, "'transitions' must be null or hold 'counts'"),
-        ({"transitions": {"counts": [[1, 2, -3]] * 3}}, "'transitions' must be null or hold 'counts'"),
-        ({"transitions": {"counts": [[1, 2, 0.5]] * 3}}, "'transitions' must be null or hold 'counts'"),
     ],
 )
 def test_a_model_json_that_cannot_be_used_is_named(world: Path, change: dict[str, Any], message: str) -> None:
