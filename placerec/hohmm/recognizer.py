@@ -54,7 +54,8 @@ class Recognizer:
     `models`: one BackoffModel per place, all of the same words. `selection` is that of their training. `transition`:
     how the place changes (default: the paper's). `dictionary` turns images into words, for `update` with images.
     `max_gap`: more seconds than this between two frames begin a new sequence. `emissions`: what gives the words'
-    probabilities, in place of the models. Raises ModelError if the models do not list the same words.
+    probabilities, in place of the models. Raises ModelError if the models do not list the same words, or the
+    transitions are between more or fewer places.
     """
 
     def __init__(
@@ -72,6 +73,8 @@ class Recognizer:
         self.places = tuple(models)
         self.selection = selection
         self.transition = transition or fixed_transition(len(models))
+        if len(self.transition.matrix) != len(models):
+            raise ModelError(f"transitions between {len(self.transition.matrix)} places for {len(models)} models")
         self.dictionary = dictionary
         self.max_gap = max_gap
         self._words = common_words(models)

@@ -101,6 +101,11 @@ def test_models_of_different_words_are_refused() -> None:
         Recognizer(models)
 
 
+def test_transitions_between_other_places_are_refused() -> None:
+    with pytest.raises(ModelError, match="^transitions between 3 places for 2 models"):
+        Recognizer(models_of([[["a"]], [["c"]]], 2), transition=fixed_transition(3))
+
+
 def timed(words: list[str], times: list[float]) -> WordStream:
     bare = WordStream.of("run", words)
     return WordStream("run", bare.frames, np.array(times, float), bare.places, bare.words, bare.distances)

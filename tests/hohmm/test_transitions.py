@@ -37,7 +37,7 @@ def test_many_steps_forget_where_they_began() -> None:
 
 
 def test_the_smallest_change_is_not_lost() -> None:
-    # 1 - (1 - 1e-18) is 0 in floating point; the chance to be elsewhere after two steps is not.
+    # Half a unit in the last place of 1: the chance to be elsewhere is known to all digits.
     transition = fixed_transition(2, 1 - 2.0**-53)
     assert transition.over(2)[0, 1] == pytest.approx(2 * 2.0**-53, rel=1e-12)
 
