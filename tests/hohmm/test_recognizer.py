@@ -102,7 +102,7 @@ def test_models_of_different_words_are_refused() -> None:
 
 
 def test_transitions_between_other_places_are_refused() -> None:
-    with pytest.raises(ModelError, match="^transitions between 3 places for 2 models"):
+    with pytest.raises(ModelError, match=r"^transitions between 3 places for 2 models"):
         Recognizer(models_of([[["a"]], [["c"]]], 2), transition=fixed_transition(3))
 
 
