@@ -19,7 +19,7 @@ LN10 = log(10.0)
 # Updates that follow each other while all blocks go on side by side. The blocks' borders must not depend on the length
 # of the sequence, or later words would change the last digit of earlier beliefs.
 BLOCK = 256
-# Steps between two normalisations of a block's operator: by a factor of at most MIXING each, they cannot underflow.
+# Steps between two normalisations of a block's operator: each leaves MIXING of it at least, so that none underflows.
 UNSCALED = 8
 # Numbers in the operators of the blocks that go on side by side: they should stay in cache.
 SIDE_BY_SIDE = 1 << 15

@@ -23,7 +23,7 @@ def test_the_filter_is_its_definition(case: Case) -> None:
     assert found.unexplained == explained.count(False)
 
 
-@settings(max_examples=60)
+@settings(max_examples=50)
 @given(cases(longest=60), st.integers(1, 9), st.integers(1, 100), st.integers(1, 3))
 def test_blocks_of_any_size_give_the_same(case: Case, block: int, together: int, unscaled: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
@@ -36,6 +36,7 @@ def test_blocks_of_any_size_give_the_same(case: Case, block: int, together: int,
     assert np.array_equal(blocks.explained, whole.explained)
 
 
+@settings(max_examples=40)
 @given(cases(longest=40))
 def test_word_by_word_is_the_array(case: Case) -> None:
     whole = filter_stream(case.log10_p, case.transition, case.steps).belief

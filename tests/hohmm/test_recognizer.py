@@ -140,7 +140,7 @@ def test_online_is_batch_for_all_options(
         assert belief.selected == batch.selected[i]
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(situations(), st.integers(0, 40))
 def test_lags_go_from_the_filter_to_smoothing(
     situation: tuple[dict[str, BackoffModel], Selection, Transition, float | None, WordStream], lag: int

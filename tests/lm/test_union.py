@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing, union, with_unigrams
@@ -30,6 +30,7 @@ def models_of(
     ]
 
 
+@settings(max_examples=60)
 @given(corpora, texts, st.lists(st.integers(1, 4), min_size=4, max_size=4), names, minima)
 def test_the_union_scores_as_each_model_does(
     corpus: list[list[list[str]]], text: list[str], orders: list[int], name: str, minimum: tuple[int, ...]
