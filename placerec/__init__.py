@@ -26,7 +26,7 @@ _ROOMS = {
         "fixed_transition",
         "read_beliefs",
     ),
-    "placerec.model": ("Options", "decode", "load_recognizer", "train_lm", "update"),
+    "placerec.model": ("Options", "calibrate", "decode", "load_recognizer", "train_lm", "update"),
     "placerec.evaluation": ("evaluate", "evaluate_files"),
     "placerec.lab": ("render_lab",),
 }
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.checks import check_model
     from placerec.lm.inspection import inspect_model
-    from placerec.model import Options, decode, load_recognizer, train_lm, update
+    from placerec.model import Options, calibrate, decode, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
@@ -69,6 +69,7 @@ __all__ = [
     "Transition",
     "WordStream",
     "__version__",
+    "calibrate",
     "check_model",
     "count_ngrams",
     "decode",

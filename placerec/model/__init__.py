@@ -1,5 +1,6 @@
 """The MODEL/ folder: train, load."""
 
+from placerec.model.calibrate import calibrate
 from placerec.model.corpus import Corpus, read_corpus
 from placerec.model.decode import decode, decode_lines, format_beliefs
 from placerec.model.load import PlaceModels, load_model, load_recognizer, make_recognizer
@@ -10,6 +11,7 @@ __all__ = [
     "Corpus",
     "Options",
     "PlaceModels",
+    "calibrate",
     "decode",
     "decode_lines",
     "estimate_place",

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from placerec.errors import EvaluationError
 from placerec.evaluation import Evaluation, evaluate
-from placerec.evaluation.metrics import calibration_error, change_latencies
+from placerec.evaluation.confidence import new_places, reliability, risk_coverage
+from placerec.evaluation.metrics import change_latencies
 from placerec.hohmm.beliefs import Beliefs
 
 
@@ -102,7 +103,7 @@ def test_latency_of_cases_worked_by_hand(truth: str, best: str, latencies: list[
     def codes(letters: str) -> NDArray[np.int64]:
         return np.array([index[letter] for letter in letters], dtype=np.int64)
 
-    assert change_latencies(codes(truth), codes(best)).tolist() == latencies
+    assert change_latencies(codes(truth), codes(truth) == codes(best)).tolist() == latencies
 
 
 def test_latency_is_the_median_over_the_changes_of_all_sequences() -> None:
@@ -131,14 +132,14 @@ def test_calibration_error_of_a_case_worked_by_hand() -> None:
     # 0.2 is 3/15 and belongs to (2/15, 3/15]: gap 0.2, 1 frame. 0.21 lies in the bin above: right, gap 0.79, 1 frame.
     confidence = np.array([0.95, 0.99, 0.2, 0.21])
     right = np.array([True, False, False, True])
-    assert calibration_error(confidence, right) == pytest.approx((2 * 0.47 + 0.2 + 0.79) / 4)
+    assert reliability(confidence, right).error == pytest.approx((2 * 0.47 + 0.2 + 0.79) / 4)
     # Were the edge in the bin above, 0.2 and 0.21 would share it: mean 0.205, accuracy 0.5, gap 0.295 for 2 frames.
-    assert calibration_error(np.array([0.2, 0.21]), right[2:]) == pytest.approx((0.2 + 0.79) / 2)
+    assert reliability(np.array([0.2, 0.21]), right[2:]).error == pytest.approx((0.2 + 0.79) / 2)
 
 
 def test_calibration_counts_beliefs_of_0_and_1() -> None:
-    assert calibration_error(np.array([0.0, 1.0]), np.array([True, False])) == 1.0
-    assert calibration_error(np.array([0.0, 1.0]), np.array([False, True])) == 0.0
+    assert reliability(np.array([0.0, 1.0]), np.array([True, False])).error == 1.0
+    assert reliability(np.array([0.0, 1.0]), np.array([False, True])).error == 0.0
 
 
 def test_ece_is_of_the_decided_place_not_of_the_largest_belief() -> None:

@@ -151,7 +151,7 @@ def test_panels_draw_on_a_figure_of_ones_own(tmp_path: Path) -> None:
         assert (wrong == 0).all(axis=1).nonzero()[0].tolist() == [0, 1, 2, 3, 4]
         belief = np.asarray(left.images[1].get_array())
         # Frame 30 is believed to be in the corridor with 0.9: nine tenths of the height from below.
-        corridor = (belief[:, 30] == place_colours(3)[0]).all(axis=1)
+        corridor = (belief[:, 30] == place_colours(PLACES)[0]).all(axis=1)
         assert corridor.tolist() == [True] * 108 + [False] * 12
         assert np.asarray(right.images[0].get_array()).sum(axis=1) == pytest.approx(1)
     assert (tmp_path / "a.png").exists()
@@ -165,7 +165,7 @@ def test_nothing_is_left_when_drawing_fails(tmp_path: Path) -> None:
 
 
 def test_colours_of_36_places_differ() -> None:
-    colours = place_colours(36)
+    colours = place_colours([str(number) for number in range(36)])
     assert len({tuple(colour) for colour in colours.round(3).tolist()}) == 36
     assert ((colours >= 0) & (colours <= 1)).all()
 

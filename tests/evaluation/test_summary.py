@@ -41,6 +41,7 @@ def test_the_whole_table_of_a_small_case() -> None:
         "change latency     1 frames, median of 1 change of place\n"
         "ECE                0.000   (15 bins; 0 is calibrated)\n"
         "log loss           0.693   (nats per frame; 0 is best)\n"
+        "risk-coverage      0.500   (area; of the surest half 50.0 % are right)\n"
         "sequences          2: 33.3 % (day) to 100.0 % (night)\n"
         "\n"
         "  #  place    frames  precision     recall\n"
