@@ -7,7 +7,7 @@ import click
 from placerec.cli.options import PATH, FiniteRange, talk_options
 
 
-@click.command(epilog="Example: placerec calibrate model/ tokens/run4.tsv && placerec decode tokens/run5.tsv -m model/")
+@click.command(epilog="Example: placerec calibrate model/ tokens/run4.tsv tokens/run5.tsv")
 @click.argument("model", metavar="MODEL/", type=PATH)
 @click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH)
 @click.option(

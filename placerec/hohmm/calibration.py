@@ -2,9 +2,8 @@
 
 Neighbouring frames see nearly the same, and the filter counts them as independent: it is too sure. A belief raised to
 1 / temperature, place by place, and brought back to a sum of 1 is less so, and its order of places stays as it is: no
-decision changes. It beat the other remedies on real runs (docs/recognizer.md): likelihoods raised to a power inside
-the filter make it slow to notice a change; a bias per place, and isotonic regression, change decisions and need more
-labelled frames than a user has.
+decision changes. Isotonic regression, which is about as good, changes decisions and asks for more labelled frames;
+word probabilities raised to a power inside the filter make it slow to notice a change (docs/recognizer.md has numbers).
 """
 
 import math
