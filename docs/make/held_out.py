@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from placerec.frames import find_sequences
 from placerec.hohmm import filter_stream, fixed_transition
-from placerec.model import Options, train_place
+from placerec.lm import count_ngrams
+from placerec.model.train import Options, estimate_place
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe
 from placerec.words import Selection, Sentences, WordStream, sentences_per_place
 from placerec.words.tokenize import tokens_of
@@ -81,7 +82,11 @@ def trained(training: Descriptors, tests: Descriptors) -> Iterator[Trained]:
             dictionary = Dictionary.fit(training.values, spec=DescriptorSpec(), size=size, seed=seed)
             streams, others = tokens_of(training, dictionary), tokens_of(tests, dictionary)
             sentences = sentences_per_place(streams, Selection())
-            models = [train_place(text, dictionary.vocabulary, Options())[0] for text in sentences.values()]
+            counts = [
+                count_ngrams(text, Options().order, vocabulary=dictionary.vocabulary, markers=False)
+                for text in sentences.values()
+            ]
+            models = [estimate_place(one, Options()) for one in counts]
             log10_p = [np.stack([model.score(stream.words) for model in models], axis=1) for stream in others]
             yield Trained(sentences, streams, others, log10_p, len(dictionary.vocabulary))
 

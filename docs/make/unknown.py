@@ -13,6 +13,7 @@ import numpy as np
 from held_out import Floats, Trained, arguments, described, filtered, folds, part, trained
 
 from placerec.evaluation.confidence import new_places
+from placerec.hohmm.distances import Histogram, distance_histogram
 from placerec.hohmm.unknown import UnknownModel, evidence, filter_unknown, unknown_model, word_runs
 from placerec.vision import Descriptors
 
@@ -34,16 +35,11 @@ def training_of(frames: Descriptors, test: list[str], place: str) -> Descriptors
     return None
 
 
-def histograms(case: Trained) -> list[dict[int, int]]:
-    """Per place the log2 distances in training, in eighths."""
+def histograms(case: Trained) -> list[Histogram]:
+    """Per place the distances in training."""
     labels = np.array([place for stream in case.training for place in stream.places])
     distances = np.concatenate([stream.distances for stream in case.training])
-    found = []
-    for place in case.places:
-        known = distances[(labels == place) & (distances > 0)]
-        bins, counts = np.unique(np.floor(8 * np.log2(known)).astype(int), return_counts=True)
-        found.append(dict(zip(bins.tolist(), counts.tolist(), strict=True)))
-    return found
+    return [distance_histogram(distances[labels == place]) for place in case.places]
 
 
 def scores(case: Trained) -> list[Floats]:

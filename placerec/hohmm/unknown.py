@@ -15,12 +15,14 @@ independent samples is taken to be that of runs of equal words.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
+
+from placerec.hohmm.distances import BINS_PER_OCTAVE, Histogram
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +34,6 @@ OUTLYING = 1.0
 _FREEDOM = 0.9
 # What the correction leaves open, in octaves.
 _SHIFT_ERROR = 0.3
-_BINS_PER_OCTAVE = 8
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def word_runs(sentences: Iterable[Sequence[Sequence[str]]]) -> WordRuns:
 def unknown_model(
     vocabulary: int,
     runs: WordRuns,
-    histograms: Sequence[Mapping[int, int]] | None = None,
+    histograms: Sequence[Histogram] | None = None,
     *,
     measured: tuple[float, float] | None = None,
 ) -> UnknownModel:
@@ -94,7 +95,7 @@ def unknown_model(
 
 
 def measure_distances(
-    distances: Floats, places: NDArray[np.int64], histograms: Sequence[Mapping[int, int]]
+    distances: Floats, places: NDArray[np.int64], histograms: Sequence[Histogram]
 ) -> tuple[float, float] | None:
     """Shift and variance of log2 distance against the training means, over frames (n,) of known places.
 
@@ -202,7 +203,7 @@ def _distance_evidence(model: DistanceModel, predicted: Floats, distances: Float
 
 
 def _distance_model(
-    histograms: Sequence[Mapping[int, int]], runs: WordRuns, measured: tuple[float, float] | None
+    histograms: Sequence[Histogram], runs: WordRuns, measured: tuple[float, float] | None
 ) -> DistanceModel | None:
     if not any(histograms):
         return None
@@ -211,10 +212,10 @@ def _distance_model(
     return DistanceModel(means + shift, spread + _SHIFT_ERROR**2)
 
 
-def _training_distances(histograms: Sequence[Mapping[int, int]]) -> tuple[Floats, float]:
+def _training_distances(histograms: Sequence[Histogram]) -> tuple[Floats, float]:
     """Of log2 distance in training: the mean (C,) per place, that of all where it has none, and the variance within."""
     counts = [np.array(list(histogram.values()), np.float64) for histogram in histograms]
-    values = [(np.array(list(histogram), np.float64) + 0.5) / _BINS_PER_OCTAVE for histogram in histograms]
+    values = [(np.array(list(histogram), np.float64) + 0.5) / BINS_PER_OCTAVE for histogram in histograms]
     sums = [float(count @ value) for count, value in zip(counts, values, strict=True)]
     total = sum(float(count.sum()) for count in counts)
     overall = sum(sums) / total if total else math.nan

@@ -1,20 +1,21 @@
 """Calibration of a MODEL/ folder on labelled sequences that trained nothing of it."""
 
-import json
 import logging
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import ModelError
-from placerec.files import write_text
+from placerec.files import held_folder, write_text
 from placerec.hohmm import Beliefs
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.unknown import measure_distances
 from placerec.model.decode import _token_streams
 from placerec.model.load import PlaceModels, load_model, make_recognizer
+from placerec.model.train import MODEL_JSON, format_description
 from placerec.words import WordStream
 
 log = logging.getLogger(__name__)
@@ -27,21 +28,19 @@ def calibrate(model: Path | str, tokens: Sequence[Path | str], *, stay: float = 
     places that the model does not know, are left out and counted. Raises ModelError for sequences that trained the
     model, and if no frame is left; model.json is then as it was.
     """
-    models = load_model(model)
-    streams = _token_streams(tokens, models)
-    _refuse_training(models, streams)
-    decoded = _decoded(models, streams, stay)
-    belief, truth = _judged(models, decoded)
-    calibration = fit_calibration(belief, truth)
-    names = [stream.name for stream in streams]
-    description = dict(models.description)
-    description["calibration"] = {
-        **calibration.to_json(),
-        "distances": _measured(models, streams),
-        "options": {"stay": stay},
-        "sequences": names,
-    }
-    write_text(models.path / "model.json", json.dumps(description, indent=2, ensure_ascii=False) + "\n")
+    path = Path(model)
+    with held_folder(path) if path.is_dir() else nullcontext():
+        models = load_model(path)
+        streams = _token_streams(tokens, models)
+        _refuse_training(models, streams)
+        calibration = fit_calibration(*_judged(models, _decoded(models, streams, stay)))
+        found = {
+            **calibration.to_json(),
+            "distances": _measured(models, streams),
+            "options": {"stay": stay},
+            "sequences": [stream.name for stream in streams],
+        }
+        write_text(path / MODEL_JSON, format_description({**models.description, "calibration": found}))
     losses = calibration.log_loss_before, calibration.log_loss_after
     log.info("%s: temperature %g, log loss %.3f -> %.3f on these frames", model, calibration.temperature, *losses)
     return calibration
