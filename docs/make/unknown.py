@@ -17,10 +17,9 @@ from placerec.hohmm.distances import Histogram, distance_histogram
 from placerec.hohmm.unknown import UnknownModel, evidence, filter_unknown, unknown_model, word_runs
 from placerec.vision import Descriptors
 
-HEAD = """\
-| set | place left out | frames | 1 - belief | entropy | words | words, distance | noticed | others taken for new |
-| --- | --- | --- | --- | --- | --- | --- | --- | --- |
-"""
+SCORES = ("1 - belief", "entropy", "distance", "words", "words, distance")
+TITLES = ("set", "place left out", "frames", *SCORES, "noticed", "others taken for new")
+HEAD = f"| {' | '.join(TITLES)} |\n|{' --- |' * len(TITLES)}\n"
 
 
 def training_of(frames: Descriptors, test: list[str], place: str) -> Descriptors | None:
@@ -43,7 +42,7 @@ def histograms(case: Trained) -> list[Histogram]:
 
 
 def scores(case: Trained) -> list[Floats]:
-    """Per test sequence, what speaks for a new place (T, 4): 1 - belief, entropy, words, words with distances."""
+    """Per test sequence, what speaks for a new place, float64 (T, 5) in the order of SCORES."""
     runs = word_runs(case.sentences.values())
     alone = unknown_model(case.vocabulary, runs)
     both = unknown_model(case.vocabulary, runs, histograms(case))
@@ -57,7 +56,9 @@ def scores(case: Trained) -> list[Floats]:
             return filter_unknown(evidence(model, log10_p, before, far), log10_p.shape[1])
 
         entropy = -(after * np.log(np.maximum(after, 1e-300))).sum(axis=1)
-        found.append(np.stack([1 - after.max(axis=1), entropy, unknown(alone), unknown(both)], axis=1))
+        found.append(
+            np.stack([1 - after.max(axis=1), entropy, stream.distances, unknown(alone), unknown(both)], axis=1)
+        )
     return found
 
 
@@ -78,9 +79,11 @@ def row(folder: Path, frames: Descriptors, test: list[str], place: str) -> str:
     maps = [np.concatenate(parts) for parts in judged.values()]
     if not is_new.any():
         return ""
-    areas = np.array([[new_places(one[:, column], is_new).auroc for column in range(4)] for one in maps], np.float64)
-    noticed = np.mean([(one[is_new, 3] > 0.5).mean() for one in maps])
-    mistaken = np.mean([(one[~is_new, 3] > 0.5).mean() for one in maps])
+    areas = np.array(
+        [[new_places(one[:, column], is_new).auroc for column in range(len(SCORES))] for one in maps], np.float64
+    )
+    noticed = np.mean([(one[is_new, -1] > 0.5).mean() for one in maps])
+    mistaken = np.mean([(one[~is_new, -1] > 0.5).mean() for one in maps])
     cells = [f"{one.mean():.2f} ± {one.std():.2f}" for one in areas.T]
     cells += [f"{100 * share:.0f} %" for share in (noticed, mistaken)]
     return f"| {folder.name} | {place} | {int(is_new.sum())} of {len(is_new)} | {' | '.join(cells)} |\n"
