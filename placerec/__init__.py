@@ -28,7 +28,7 @@ _ROOMS = {
         "read_beliefs",
         "read_transitions",
     ),
-    "placerec.model": ("Decoding", "Options", "decode", "load_recognizer", "train_lm", "update"),
+    "placerec.model": ("Decoding", "Options", "calibrate", "decode", "load_recognizer", "train_lm", "update"),
     "placerec.evaluation": ("evaluate", "evaluate_files"),
     "placerec.lab": ("render_lab",),
 }
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.checks import check_model
     from placerec.lm.inspection import inspect_model
-    from placerec.model import Decoding, Options, decode, load_recognizer, train_lm, update
+    from placerec.model import Decoding, Options, calibrate, decode, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
@@ -74,6 +74,7 @@ __all__ = [
     "Transition",
     "WordStream",
     "__version__",
+    "calibrate",
     "check_model",
     "count_ngrams",
     "decode",

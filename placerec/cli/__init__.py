@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from placerec.cli.calibrate import calibrate
 from placerec.cli.check import check
 from placerec.cli.decode import decode
 from placerec.cli.demo import demo
@@ -69,7 +70,20 @@ def commands() -> None:
     """Which place is the camera in? Images become words, places become language models."""
 
 
-for command in (describe, train_words, tokenize, train_lm, update, decode, evaluate, inspect, check, lab, demo):
+for command in (
+    describe,
+    train_words,
+    tokenize,
+    train_lm,
+    update,
+    decode,
+    evaluate,
+    calibrate,
+    inspect,
+    check,
+    lab,
+    demo,
+):
     commands.add_command(command)
 for tool in SRILM_COMMANDS:
     commands.add_command(tool)

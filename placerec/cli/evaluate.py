@@ -17,7 +17,7 @@ from placerec.cli.options import FILE, PATH_OR_STREAM, json_option, talk_options
     metavar="FILE.png",
     type=FILE,
     default=None,
-    help="Draw beliefs against the truth, and the confusion matrix: .png, .svg or .pdf.",
+    help="Draw beliefs against the truth, what was confused, and how far to trust them: .png, .svg or .pdf.",
 )
 @talk_options
 def evaluate(beliefs: tuple[Path, ...], as_json: bool, plot: Path | None) -> None:

@@ -1,5 +1,6 @@
 """Beliefs into knowledge: numbers, pictures and pages."""
 
+from placerec.evaluation.curves import coverage_panel, reliability_panel, roc_panel
 from placerec.evaluation.metrics import Evaluation, PlaceScore, SequenceScore, evaluate
 from placerec.evaluation.panels import belief_strip, confusion_panel, figure_file, legend_panel
 from placerec.evaluation.plots import plot_evaluation
@@ -13,6 +14,7 @@ __all__ = [
     "SequenceScore",
     "belief_strip",
     "confusion_panel",
+    "coverage_panel",
     "evaluate",
     "evaluate_files",
     "figure_file",
@@ -24,5 +26,7 @@ __all__ = [
     "picture",
     "plot_evaluation",
     "preformatted",
+    "reliability_panel",
+    "roc_panel",
     "table",
 ]

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import MissingExtraError, OutputError
-from placerec.evaluation.metrics import Evaluation, codes, place_order
+from placerec.evaluation.metrics import Evaluation, codes, place_order, right_frames
 from placerec.evaluation.summary import percent, shorten
 from placerec.files import whole_file
-from placerec.hohmm.beliefs import Beliefs
+from placerec.hohmm.beliefs import UNKNOWN, Beliefs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,7 @@ _DPI = 130
 # colour vision. Black is kept for what is wrong.
 _BRIGHT = (0x56B4E9, 0xE69F00, 0x009E73, 0xCC79A7, 0x332288, 0xF0E442)
 _PALETTE = (*_BRIGHT, 0xD55E00, 0x0072B2, 0x999933, 0x882255, 0xDDCC77, 0x999999)
-_WHITE, _BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+_WHITE, _BLACK, _GREY = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.78, 0.78, 0.78)
 
 # More columns than this would fall between the pixels of a strip.
 _MOST_COLUMNS = 1500
@@ -78,16 +78,22 @@ def figure_file(path: Path | str, width: float, height: float) -> "Iterator[Figu
             figure.savefig(partial, dpi=_DPI, metadata=_METADATA[path.suffix.lower()])
 
 
-def place_colours(count: int) -> NDArray[np.float64]:
-    """Colours for `count` places, (count, 3) red, green, blue from 0 to 1; from the thirteenth on they get darker."""
+def place_colours(places: Sequence[str]) -> NDArray[np.float64]:
+    """A colour for each of n places, (n, 3) red, green, blue from 0 to 1; from the thirteenth on they get darker.
+
+    `unknown` is light grey.
+    """
     base = np.array([[(colour >> shift & 255) / 255 for shift in (16, 8, 0)] for colour in _PALETTE])
-    index = np.arange(count)
+    index = np.arange(len(places))
     colours: NDArray[np.float64] = base[index % len(base)] * 0.6 ** (index // len(base))[:, None]
+    colours[[place == UNKNOWN for place in places]] = _GREY
     return colours
 
 
 def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None = None, title: str = "") -> None:
     """Draw one sequence: true places on top, the beliefs stacked to 1, decided places below, black where wrong.
+
+    With a column `unknown` its share comes on top of the places', which are drawn as much lower.
 
     places: all places of the picture, in the order of their colours; by default the sequence's own. Of a long
     sequence evenly spaced frames are drawn.
@@ -95,7 +101,7 @@ def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None
     places = place_order([beliefs]) if places is None else places
     frames = len(beliefs.frames)
     # One more colour than places: the last answers for index -1, no label.
-    colours = np.vstack([place_colours(len(places)), _WHITE])
+    colours = np.vstack([place_colours(places), _WHITE])
     axes.set(xlim=(0, max(frames, 1)), ylim=(_WRONG[0] - 0.05, _TRUE[1]), facecolor="none")
     axes.spines[:].set_visible(False)
     heights = [sum(span) / 2 for span in (_TRUE, (0, 1), _DECIDED, _WRONG)]
@@ -110,10 +116,10 @@ def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None
     drawn = np.unique(np.linspace(0, frames - 1, min(frames, _MOST_COLUMNS)).round().astype(np.int64))
     if len(drawn) < frames:
         axes.set_title(f"{len(drawn)} of {frames} frames are drawn", loc="right", fontsize=6.5, color="0.4", pad=3)
-    wrong = ((truth != decided) & (truth >= 0))[drawn]
+    wrong = (~right_frames(beliefs) & (truth >= 0))[drawn]
     bars = [
         (_TRUE, colours[truth[drawn]][None]),
-        ((0.0, 1.0), colours[_stacked(beliefs.belief[drawn], codes(beliefs.places, places))]),
+        ((0.0, 1.0), colours[_stacked(*_shares(beliefs, drawn, places))]),
         (_DECIDED, colours[decided[drawn]][None]),
         (_WRONG, np.where(wrong[:, None], _BLACK, _WHITE)[None]),
     ]
@@ -150,7 +156,7 @@ def legend_panel(axes: "Axes", places: Sequence[str]) -> None:
     """Draw which colour is which place, and what black and white mean."""
     from matplotlib.patches import Patch
 
-    colours = [*map(tuple, place_colours(len(places)).tolist()), _BLACK, _WHITE]
+    colours = [*map(tuple, place_colours(places).tolist()), _BLACK, _WHITE]
     labels = [*(shorten(place, 22) for place in places), "decided wrongly", "no label"]
     patches = [
         Patch(facecolor=colour, edgecolor="0.5", linewidth=0.5, label=label)
@@ -163,6 +169,17 @@ def legend_panel(axes: "Axes", places: Sequence[str]) -> None:
 def strip_title(name: str, accuracy: float | None) -> str:
     """The line above a strip: which sequence, and how much of it was right."""
     return f"{shorten(name, 70)}   {'no frame has a label' if accuracy is None else percent(accuracy) + ' right'}"
+
+
+def _shares(
+    beliefs: Beliefs, drawn: NDArray[np.int64], places: Sequence[str]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The probabilities of the frames `drawn` (n, columns), and the place of each column."""
+    belief = beliefs.belief[drawn]
+    if beliefs.unknown is None:
+        return belief, codes(beliefs.places, places)
+    unknown = beliefs.unknown[drawn, None]
+    return np.hstack([belief * (1 - unknown), unknown]), codes((*beliefs.places, UNKNOWN), places)
 
 
 def _stacked(belief: NDArray[np.float64], place: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -179,7 +196,7 @@ def _name_visits(axes: "Axes", truth: NDArray[np.int64], places: Sequence[str]) 
     font = 6.5
     room = _inches(axes) * 72 / len(truth)
     starts = np.concatenate(([0], np.flatnonzero(np.diff(truth)) + 1))
-    luminance = place_colours(len(places)) @ (0.299, 0.587, 0.114)
+    luminance = place_colours(places) @ (0.299, 0.587, 0.114)
     for start, end in zip(starts, [*starts[1:], len(truth)], strict=True):
         place = int(truth[start])
         if place >= 0 and (end - start) * room > _LETTER * font * (len(places[place]) + 1):

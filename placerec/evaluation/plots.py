@@ -1,4 +1,4 @@
-"""One picture of an evaluation: every sequence's beliefs under its true places, and which places were confused."""
+"""One picture of an evaluation: every sequence's beliefs under its true places, what was confused, and how surely."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from placerec.evaluation.curves import coverage_panel, reliability_panel, roc_panel
 from placerec.evaluation.metrics import Evaluation
 from placerec.evaluation.panels import belief_strip, confusion_panel, figure_file, legend_panel, strip_title
 from placerec.evaluation.summary import percent, shorten
@@ -21,10 +22,11 @@ MOST_STRIPS = 20
 _WIDTH, _MARGIN, _HEAD = 14.0, 0.3, 1.15
 _STRIP_LEFT, _STRIP_WIDTH = 0.75, 7.6
 _SIDE_LEFT, _MATRIX_LEFT = 8.75, 10.3
+_CURVES_LEFT, _CURVE, _CURVE_STEP, _CURVES_HEIGHT = 9.1, 1.95, 2.55, 2.9
 
 
 def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Path | str) -> None:
-    """Draw beliefs and confusion matrix into one picture; PNG, SVG or PDF by suffix.
+    """Draw beliefs, confusion matrix and how far to trust them into one picture; PNG, SVG or PDF by suffix.
 
     beliefs: those that `evaluation` judged. Of more than 20 sequences the best, the worst and evenly many between are
     drawn, and the picture says so. The same numbers give the same bytes. Raises OutputError for another suffix or a
@@ -35,6 +37,10 @@ def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Pa
     matrix = min(_WIDTH - _MARGIN - _MATRIX_LEFT, 0.6 * places)
     legend = 0.23 * (places // 2 + 2)
     side = legend + matrix + 2.0
+    # The curves stand below one sequence, or else below the matrix.
+    below = len(shown) == 1 and side >= 2.5 + _CURVES_HEIGHT
+    left, top = (_STRIP_LEFT, 2.8) if below else (_CURVES_LEFT, side + 0.15)
+    side = side if below else side + _CURVES_HEIGHT - 0.3
     # Few strips are as high as the side beside them, many as low as can be read.
     strip = min(2.0, max(0.68, 5 / len(shown), side / len(shown) - 0.45))
     step = strip + 0.42
@@ -52,6 +58,12 @@ def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Pa
         axes.set_xlabel("frame", fontsize=7, labelpad=1)
         legend_panel(panel(_SIDE_LEFT, _HEAD, _WIDTH - _MARGIN - _SIDE_LEFT, legend), evaluation.places)
         confusion_panel(panel(_MATRIX_LEFT, _HEAD + legend + 0.5, matrix, matrix), evaluation)
+        reliability_panel(panel(left, _HEAD + top, _CURVE, _CURVE), evaluation.reliability)
+        beside = panel(left + _CURVE_STEP, _HEAD + top, _CURVE, _CURVE)
+        if evaluation.new_places is not None and evaluation.new_places.auroc is not None:
+            roc_panel(beside, evaluation.new_places)
+        else:
+            coverage_panel(beside, evaluation.risk_coverage)
 
 
 def chosen(beliefs: Sequence[Beliefs], evaluation: Evaluation, most: int = MOST_STRIPS) -> list[Beliefs]:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from placerec.evaluation.metrics import ECE_BINS, Evaluation
+from placerec.evaluation.confidence import COVERAGES, ECE_BINS
+from placerec.evaluation.metrics import Evaluation
 
 _WIDTH = 100
 _NAME_WIDTH = 32
@@ -34,6 +35,7 @@ def _overall(evaluation: Evaluation) -> list[str]:
     changes = f"{evaluation.changes} change{'' if evaluation.changes == 1 else 's'} of place"
     delay = f"– ({changes})" if latency is None else f"{latency:g} frames, median of {changes}"
     majority = f"always {shorten(evaluation.majority_place, _NAME_WIDTH)!r}: {percent(evaluation.majority_accuracy)}"
+    half = percent(float(evaluation.risk_coverage.accuracy[COVERAGES.index(0.5)]))
     lines = [
         f"frames             {evaluation.frames} judged, {evaluation.unlabelled} without a label left out",
         f"accuracy           {percent(evaluation.accuracy)}   (majority class, {majority})",
@@ -41,8 +43,17 @@ def _overall(evaluation: Evaluation) -> list[str]:
         f"change latency     {delay}",
         f"ECE                {evaluation.ece:.3f}   ({ECE_BINS} bins; 0 is calibrated)",
         f"log loss           {evaluation.log_loss:.3f}   (nats per frame; 0 is best)",
+        f"risk-coverage      {evaluation.risk_coverage.area:.3f}   (area; of the surest half {half} are right)",
     ]
-    return [*lines, *_sequences(evaluation)]
+    return [*lines, *_new_places(evaluation), *_sequences(evaluation)]
+
+
+def _new_places(evaluation: Evaluation) -> list[str]:
+    found = evaluation.new_places
+    if found is None:
+        return []
+    area = "–" if found.auroc is None else f"{found.auroc:.3f}"
+    return [f"unknown AUROC      {area}   ({found.new} frames of places without a column, {found.known} of others)"]
 
 
 def _sequences(evaluation: Evaluation) -> list[str]:

@@ -1,6 +1,15 @@
 """Words and language models -> belief over places: the Bayesian filter of eq. 1."""
 
-from placerec.hohmm.beliefs import Beliefs, belief_rows, format_header, format_row, read_beliefs, write_beliefs
+from placerec.hohmm.beliefs import (
+    Beliefs,
+    belief_rows,
+    best_places,
+    format_header,
+    format_row,
+    read_beliefs,
+    write_beliefs,
+)
+from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.emissions import Emissions, SeparateEmissions
 from placerec.hohmm.filter import Filtered, filter_stream
 from placerec.hohmm.recognizer import Belief, Recognizer
@@ -11,13 +20,16 @@ __all__ = [
     "PER",
     "Belief",
     "Beliefs",
+    "Calibration",
     "Emissions",
     "Filtered",
     "Recognizer",
     "SeparateEmissions",
     "Transition",
     "belief_rows",
+    "best_places",
     "filter_stream",
+    "fit_calibration",
     "fixed_transition",
     "format_header",
     "format_row",

@@ -3,11 +3,12 @@
     frame  time  place  word  selected  best  PLACE...  [unknown]
 
 `time` in seconds, empty where unknown; `place` the true one, empty where unlabelled; `selected` 1 or 0; one column per
-place with its belief. The places' columns sum to 1; a last column `unknown` stands beside them and is not a place.
+place with its belief. The places' columns sum to 1. A last column `unknown`, the probability that the place is none of
+them, stands beside them: they hold given that it is not, and `best` is `unknown` where it is above 1/2.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -37,35 +38,59 @@ class Beliefs:
     words: tuple[str, ...]  # n
     selected: NDArray[np.bool_]  # (n,)
     best: tuple[str, ...]  # n
-    belief: NDArray[np.float64]  # (n, C), rows sum to 1
+    belief: NDArray[np.float64]  # (n, C), rows sum to 1: in each place, given that it is one of them
+    unknown: NDArray[np.float64] | None = None  # (n,) that the place is none of them; None where nobody asked
 
 
-def format_header(places: Iterable[str]) -> str:
+def best_places(
+    places: Sequence[str], belief: NDArray[np.float64], unknown: NDArray[np.float64] | None = None
+) -> tuple[str, ...]:
+    """What to write as `best` of n frames: the most probable place, the first of equals; UNKNOWN above 1/2.
+
+    belief: (n, C); unknown: (n,), or None where it is not asked for.
+    """
+    best = [places[index] for index in np.argmax(belief, axis=1).tolist()]
+    if unknown is None:
+        return tuple(best)
+    return tuple(UNKNOWN if new else place for place, new in zip(best, (unknown > 0.5).tolist(), strict=True))
+
+
+def format_header(places: Iterable[str], *, unknown: bool = False) -> str:
     """The header line for these places, without its line end; raises OutputError for a name that cannot be a column."""
-    return _line((*COLUMNS, *places))
+    return _line((*COLUMNS, *places, *([UNKNOWN] if unknown else [])))
 
 
 def format_row(
-    frame: str, time: float, place: str, word: str, selected: bool, best: str, belief: Iterable[float]
+    frame: str,
+    time: float,
+    place: str,
+    word: str,
+    selected: bool,
+    best: str,
+    belief: Iterable[float],
+    unknown: float | None = None,
 ) -> str:
     """One frame's line, without its line end.
 
-    time: seconds, nan where unknown, written to the microsecond; belief: C probabilities, written with nine
-    significant digits. Raises OutputError for a text that holds a tab or a line end.
+    time: seconds, nan where unknown, written to the microsecond; belief: C probabilities, and `unknown` where the
+    header has it, written with nine significant digits. Raises OutputError for a text that holds a tab or a line end.
     """
     # Not repr: frames are often stamped in epoch seconds, where anything after the microsecond is noise.
     seconds = "" if math.isnan(time) else np.format_float_positional(time, precision=6, trim="-")
-    return _line((frame, seconds, place, word, "1" if selected else "0", best, *(f"{p:.9g}" for p in belief)))
+    numbers = [*belief] if unknown is None else [*belief, unknown]
+    return _line((frame, seconds, place, word, "1" if selected else "0", best, *(f"{p:.9g}" for p in numbers)))
 
 
 def write_beliefs(path: Path | str, beliefs: Beliefs) -> None:
     """Write one sequence's beliefs, gzipped if `path` ends in .gz; raises OutputError if that cannot be done."""
-    lines = [format_header(beliefs.places), *(format_row(*row) for row in belief_rows(beliefs))]
+    unknown = [None] * len(beliefs.frames) if beliefs.unknown is None else beliefs.unknown.tolist()
+    lines = [format_header(beliefs.places, unknown=beliefs.unknown is not None)]
+    lines += [format_row(*row, new) for row, new in zip(belief_rows(beliefs), unknown, strict=True)]
     write_text(Path(path), "\n".join(lines) + "\n")
 
 
 def belief_rows(beliefs: Beliefs) -> Iterator[tuple[str, float, str, str, bool, str, list[float]]]:
-    """What `format_row` takes, frame by frame."""
+    """What `format_row` takes, frame by frame, up to the beliefs in places."""
     return zip(
         beliefs.frames,
         beliefs.times.tolist(),
@@ -100,11 +125,11 @@ def parse_beliefs(text: str, *, name: str, source: Path | str) -> Beliefs:
         raise EvaluationError(f"{source}: is empty; a beliefs file starts with a header: {' '.join(COLUMNS)} PLACE...")
     header = lines[0].split("\t")
     places = _places(header, source)
-    known = frozenset(places)
+    answers = frozenset(header[len(COLUMNS) :])
     rows = []
     for number, line in enumerate(lines[1:], start=2):
         try:
-            rows.append(_row(line.split("\t"), header, places, known))
+            rows.append(_row(line.split("\t"), header, places, answers))
         except ValueError as error:
             raise EvaluationError(at(source, number, str(error))) from None
     return Beliefs(
@@ -117,6 +142,7 @@ def parse_beliefs(text: str, *, name: str, source: Path | str) -> Beliefs:
         selected=np.array([row.selected for row in rows], dtype=np.bool_),
         best=tuple(row.best for row in rows),
         belief=np.array([row.belief for row in rows], dtype=np.float64).reshape(len(rows), len(places)),
+        unknown=np.array([row.unknown for row in rows], dtype=np.float64) if UNKNOWN in answers else None,
     )
 
 
@@ -128,6 +154,7 @@ class _Row(NamedTuple):
     selected: bool
     best: str
     belief: list[float]
+    unknown: float  # nan without that column
 
 
 def _line(fields: Iterable[str]) -> str:
@@ -157,20 +184,20 @@ def _places(header: list[str], source: Path | str) -> tuple[str, ...]:
     return tuple(places)
 
 
-def _row(fields: list[str], header: list[str], places: tuple[str, ...], known: frozenset[str]) -> _Row:
+def _row(fields: list[str], header: list[str], places: tuple[str, ...], answers: frozenset[str]) -> _Row:
     if len(fields) != len(header):
         raise ValueError(f"the line has {len(fields)} of the header's {len(header)} fields; mend or remove it")
     frame, time, place, word, selected, best = fields[: len(COLUMNS)]
     if selected not in ("0", "1"):
         raise ValueError(f"selected is {selected!r}; it is 1 or 0")
-    if best not in known:
+    if best not in answers:
         raise ValueError(f"best is {best!r}, which is no place of the header; the places are {', '.join(places)}")
     cells = fields[len(COLUMNS) :]
-    belief = [_probability(cell, column) for cell, column in zip(cells, header[len(COLUMNS) :], strict=True)]
-    belief = belief[: len(places)]
+    numbers = [_probability(cell, column) for cell, column in zip(cells, header[len(COLUMNS) :], strict=True)]
+    belief, unknown = numbers[: len(places)], numbers[-1] if UNKNOWN in answers else math.nan
     if abs(math.fsum(belief) - 1) > _SUM_TOLERANCE:
         raise ValueError(f"the beliefs sum to {math.fsum(belief):.6g}, not to 1; decode the sequence again")
-    return _Row(frame, _seconds(time), place, word, selected == "1", best, belief)
+    return _Row(frame, _seconds(time), place, word, selected == "1", best, belief, unknown)
 
 
 def _seconds(text: str) -> float:

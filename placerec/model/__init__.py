@@ -1,5 +1,6 @@
 """The MODEL/ folder: train, load."""
 
+from placerec.model.calibrate import calibrate
 from placerec.model.corpus import Corpus, read_corpus
 from placerec.model.decode import decode, decode_lines, format_beliefs
 from placerec.model.decoding import Decoding, transition_of
@@ -13,6 +14,7 @@ __all__ = [
     "Decoding",
     "Options",
     "PlaceModels",
+    "calibrate",
     "decode",
     "decode_lines",
     "estimate_place",

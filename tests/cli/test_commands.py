@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import click
@@ -69,7 +70,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_all_commands_of_the_contract_so_far_are_there() -> None:
-    expected = "check decode demo describe evaluate inspect lab tokenize train-lm train-words update"
+    expected = "calibrate check decode demo describe evaluate inspect lab tokenize train-lm train-words update"
     assert " ".join(NAMES) == expected
     assert set(commands.commands) == {*NAMES, *TOOLS}
 
@@ -422,6 +423,17 @@ def test_bad_seconds_end_a_stream_with_an_error(world: Path) -> None:
     assert result.exit_code == 1
     assert len(result.stdout.splitlines()) == 2
     assert result.stderr == "placerec: <stdin>:2: time 'soon' is not a number of seconds\n"
+
+
+# Calibration
+
+
+def test_calibrate_tells_what_it_found_and_refuses_training(world: Path, tmp_path: Path) -> None:
+    shutil.copytree(world / "model", tmp_path / "model")
+    text = done("calibrate", tmp_path / "model", world / "tokens/run3.tsv", "--stay", "0.9", "-q").stdout
+    assert re.fullmatch(r"temperature  \d.*\nlog loss     \d.* -> \d.*60 frames.*\n", text)
+    assert json.loads((tmp_path / "model/model.json").read_text())["calibration"]["options"] == {"stay": 0.9}
+    fails("run1: trained .*, which is surer of it", "calibrate", tmp_path / "model", world / "tokens/run1.tsv")
 
 
 # Evaluation

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from placerec.errors import EvaluationError, OutputError
 from placerec.hohmm.beliefs import (
     COLUMNS,
     Beliefs,
+    best_places,
     format_header,
     format_row,
     parse_beliefs,
@@ -29,6 +31,9 @@ def same(left: Beliefs, right: Beliefs) -> None:
     np.testing.assert_array_equal(left.selected, right.selected)
     np.testing.assert_allclose(left.times, right.times, rtol=0, atol=5.01e-7)
     np.testing.assert_allclose(left.belief, right.belief, rtol=5.01e-9, atol=0)
+    assert (left.unknown is None) == (right.unknown is None)
+    if left.unknown is not None and right.unknown is not None:
+        np.testing.assert_allclose(left.unknown, right.unknown, rtol=5.01e-9, atol=0)
 
 
 def test_the_lines_are_those_of_the_contract() -> None:
@@ -93,6 +98,7 @@ def written(draw: st.DrawFn) -> Beliefs:
         selected=np.array(draw(st.lists(st.booleans(), min_size=count, max_size=count)), dtype=np.bool_),
         best=column(st.sampled_from(places)),
         belief=belief / belief.sum(axis=1, keepdims=True),
+        unknown=draw(st.none() | arrays(np.float64, count, elements=st.floats(0, 1))),
     )
 
 
@@ -129,6 +135,19 @@ def test_the_column_unknown_is_no_place_and_stands_beside_the_sum() -> None:
     beliefs = parse_beliefs(f"{HEADER}\tunknown\n{ROW}\t0.9\n", name="seq1", source="x")
     assert beliefs.places == ("kitchen", "office")
     assert beliefs.belief.tolist() == [[0.25, 0.75]]
+    assert beliefs.unknown is not None
+    assert beliefs.unknown.tolist() == [0.9]
+
+
+def test_unknown_is_decided_above_a_half_and_where_the_column_is() -> None:
+    belief = np.array([[0.25, 0.75], [0.5, 0.5], [0.9, 0.1]])
+    places = ("kitchen", "office")
+    assert best_places(places, belief) == ("office", "kitchen", "kitchen")
+    assert best_places(places, belief, np.array([0.5, 0.51, 0.0])) == ("office", "unknown", "kitchen")
+    decided = ROW.replace("\toffice\t", "\tunknown\t")
+    assert parse_beliefs(f"{HEADER}\tunknown\n{decided}\t0.9\n", name="s", source="x").best == ("unknown",)
+    with pytest.raises(EvaluationError, match="best is 'unknown', which is no place of the header"):
+        parse_beliefs(f"{HEADER}\n{decided}\n", name="s", source="x")
 
 
 def row(**changes: str) -> str:

@@ -3,6 +3,7 @@
 import json
 import math
 from collections import Counter
+from dataclasses import replace
 from itertools import pairwise
 from statistics import median
 
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 
 from placerec.errors import EvaluationError
 from placerec.evaluation import Evaluation, evaluate
-from placerec.evaluation.metrics import calibration_error, change_latencies
+from placerec.evaluation.confidence import reliability
+from placerec.evaluation.metrics import change_latencies
 from placerec.hohmm.beliefs import Beliefs
 
 
@@ -102,7 +104,7 @@ def test_latency_of_cases_worked_by_hand(truth: str, best: str, latencies: list[
     def codes(letters: str) -> NDArray[np.int64]:
         return np.array([index[letter] for letter in letters], dtype=np.int64)
 
-    assert change_latencies(codes(truth), codes(best)).tolist() == latencies
+    assert change_latencies(codes(truth), codes(truth) == codes(best)).tolist() == latencies
 
 
 def test_latency_is_the_median_over_the_changes_of_all_sequences() -> None:
@@ -131,14 +133,14 @@ def test_calibration_error_of_a_case_worked_by_hand() -> None:
     # 0.2 is 3/15 and belongs to (2/15, 3/15]: gap 0.2, 1 frame. 0.21 lies in the bin above: right, gap 0.79, 1 frame.
     confidence = np.array([0.95, 0.99, 0.2, 0.21])
     right = np.array([True, False, False, True])
-    assert calibration_error(confidence, right) == pytest.approx((2 * 0.47 + 0.2 + 0.79) / 4)
+    assert reliability(confidence, right).error == pytest.approx((2 * 0.47 + 0.2 + 0.79) / 4)
     # Were the edge in the bin above, 0.2 and 0.21 would share it: mean 0.205, accuracy 0.5, gap 0.295 for 2 frames.
-    assert calibration_error(np.array([0.2, 0.21]), right[2:]) == pytest.approx((0.2 + 0.79) / 2)
+    assert reliability(np.array([0.2, 0.21]), right[2:]).error == pytest.approx((0.2 + 0.79) / 2)
 
 
 def test_calibration_counts_beliefs_of_0_and_1() -> None:
-    assert calibration_error(np.array([0.0, 1.0]), np.array([True, False])) == 1.0
-    assert calibration_error(np.array([0.0, 1.0]), np.array([False, True])) == 0.0
+    assert reliability(np.array([0.0, 1.0]), np.array([True, False])).error == 1.0
+    assert reliability(np.array([0.0, 1.0]), np.array([False, True])).error == 0.0
 
 
 def test_ece_is_of_the_decided_place_not_of_the_largest_belief() -> None:
@@ -159,6 +161,61 @@ def test_a_true_place_without_a_column_appears() -> None:
     }
 
 
+def with_unknown(made: Beliefs, unknown: list[float]) -> Beliefs:
+    best = tuple("unknown" if new > 0.5 else place for place, new in zip(made.best, unknown, strict=True))
+    return replace(made, best=best, unknown=np.array(unknown))
+
+
+def test_a_place_never_trained_is_right_as_unknown() -> None:
+    # True A A Z Z, decided A, unknown, unknown, A: right, wrong, right, wrong.
+    result = evaluate([with_unknown(sequence("AAZZ", "AAAA", places="AB"), [0.1, 0.7, 0.9, 0.4])])
+    assert result.places == ("A", "B", "Z", "unknown")
+    assert (result.accuracy, result.balanced_accuracy) == (0.5, 0.5)
+    assert {name: tuple(vars(score).values()) for name, score in result.per_place.items()} == {
+        "A": (1 / 2, 1 / 2, 2),
+        "B": (None, None, 0),
+        "Z": (None, 1 / 2, 2),
+        "unknown": (1 / 2, None, 0),
+    }
+    assert result.confusion.tolist() == [[1, 0, 0, 1], [0, 0, 0, 0], [1, 0, 0, 1], [0, 0, 0, 0]]
+    # Z is found at once where it begins; the beliefs are those in A (0.8) and `unknown` together.
+    assert (result.changes, result.change_latency_frames) == (1, 0)
+    evidence = [0.9 * 0.8, 0.3 * 0.8, 0.9, 0.4]
+    assert result.log_loss == pytest.approx(-np.log(evidence).mean())
+    # 0.72 (right) and 0.7 (wrong) share a bin; 0.9 is right, and 0.6 * 0.8 in A wrong.
+    assert result.ece == pytest.approx((abs(0.72 + 0.7 - 1) + abs(0.9 - 1) + 0.48) / 4)
+    # Of the pairs of a frame of Z and one of A, 0.9 beats both and 0.4 beats 0.1.
+    assert result.new_places is not None
+    assert (result.new_places.new, result.new_places.auroc) == (2, 3 / 4)
+    data = result.to_json()
+    assert (data["unknown_auroc"], data["unknown_frames"]) == (3 / 4, 2)
+    assert result.sequences["seq1"].accuracy == 0.5
+
+
+def test_without_the_column_nobody_is_judged_by_it() -> None:
+    result = evaluate([sequence("AZ", "AA")])
+    assert result.new_places is None
+    assert "unknown_auroc" not in result.to_json()
+    assert (result.accuracy, result.per_place["Z"].recall) == (0.5, 0.0)
+    # Beside a sequence that has it, one that has not counts for the accuracy alone.
+    both = evaluate([sequence("AZ", "AA"), with_unknown(sequence("AZ", "AA", name="seq2"), [0.2, 0.8])])
+    assert (both.accuracy, both.sequences["seq1"].accuracy, both.sequences["seq2"].accuracy) == (0.75, 0.5, 1.0)
+    assert both.new_places is not None
+    assert (both.new_places.new, both.new_places.known) == (1, 1)
+
+
+def test_a_label_called_unknown_is_a_new_place() -> None:
+    made = sequence("AA", "AA", places="AB")
+    result = evaluate([with_unknown(replace(made, truth=("A", "unknown")), [0.2, 0.8])])
+    assert result.places == ("A", "B", "unknown")
+    assert (result.accuracy, result.to_json()["unknown_auroc"]) == (1.0, 1.0)
+
+
+def test_where_all_frames_are_known_the_area_is_undefined() -> None:
+    result = evaluate([with_unknown(sequence("AB", "AB"), [0.2, 0.1])])
+    assert result.to_json()["unknown_auroc"] is None
+
+
 def test_sequences_may_have_different_places() -> None:
     result = evaluate([sequence("AB", "AB", places="BA"), sequence("CA", "CA", name="seq2", places="CA")])
     assert result.places == ("B", "A", "C")
@@ -177,6 +234,7 @@ def test_each_sequence_has_its_accuracy() -> None:
 def test_json_holds_what_the_contract_names_and_no_nan() -> None:
     data = evaluate([sequence("AAA", "AAB")]).to_json()
     assert {"frames", "unlabelled", "accuracy", "balanced_accuracy", "majority_accuracy", "per_place"} <= data.keys()
+    assert {"risk_coverage", "reliability"} <= data.keys()
     assert {"confusion", "change_latency_frames", "ece", "log_loss", "sequences", "changes"} <= data.keys()
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     assert data["change_latency_frames"] is None

@@ -84,6 +84,39 @@ def test_the_picture_says_what_it_shows(tmp_path: Path) -> None:
     assert "sequences:" not in text
 
 
+def test_what_is_unknown_is_drawn_and_judged(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    made = recording("seq1")
+    # The kitchen is a place without a column, and is noticed; its column goes to another place.
+    places = ("corridor", "garage", "a$b$c")
+    new = np.array([label == "kitchen" for label in made.truth])
+    best = tuple("unknown" if is_new else place for place, is_new in zip(made.best, new, strict=True))
+    best = tuple("garage" if place == "kitchen" else place for place in best)
+    beliefs = [replace(made, places=places, best=best, unknown=np.where(new, 0.75, 0.0))]
+    result = evaluate(beliefs)
+    plot_evaluation(beliefs, result, tmp_path / "a.svg")
+    text = drawn_text(tmp_path / "a.svg")
+    for needed in ("New places: AUROC 1.000", "Reliability: ECE", "unknown", "seq1   91.1 % right"):
+        assert needed in text, needed
+    with figure_file(tmp_path / "a.png", 8, 3) as figure:
+        axes = figure.subplots()
+        belief_strip(axes, beliefs[0])
+        belief = np.asarray(axes.images[1].get_array())
+        wrong = np.asarray(axes.images[3].get_array())[0]
+    # Three quarters of a frame in the kitchen are grey, from above.
+    grey = (belief[:, 12] == place_colours(["unknown"])[0]).all(axis=1)
+    assert grey.tolist() == [False] * 30 + [True] * 90
+    assert (wrong == 0).all(axis=1).nonzero()[0].tolist() == [0, 1, 2, 3, 4]
+
+
+def test_without_unknown_the_gain_of_withholding_is_drawn(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    beliefs = [recording("seq1"), recording("seq2")]
+    result = evaluate(beliefs)
+    plot_evaluation(beliefs, result, tmp_path / "a.svg")
+    assert f"Only the surest answered: area {result.risk_coverage.area:.3f}" in drawn_text(tmp_path / "a.svg")
+
+
 def test_of_many_sequences_the_best_and_the_worst_are_drawn(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     beliefs = [recording(f"seq{number}", wrong=(number * 7) % 23 % 10) for number in range(23)]
@@ -151,7 +184,7 @@ def test_panels_draw_on_a_figure_of_ones_own(tmp_path: Path) -> None:
         assert (wrong == 0).all(axis=1).nonzero()[0].tolist() == [0, 1, 2, 3, 4]
         belief = np.asarray(left.images[1].get_array())
         # Frame 30 is believed to be in the corridor with 0.9: nine tenths of the height from below.
-        corridor = (belief[:, 30] == place_colours(3)[0]).all(axis=1)
+        corridor = (belief[:, 30] == place_colours(PLACES)[0]).all(axis=1)
         assert corridor.tolist() == [True] * 108 + [False] * 12
         assert np.asarray(right.images[0].get_array()).sum(axis=1) == pytest.approx(1)
     assert (tmp_path / "a.png").exists()
@@ -165,7 +198,7 @@ def test_nothing_is_left_when_drawing_fails(tmp_path: Path) -> None:
 
 
 def test_colours_of_36_places_differ() -> None:
-    colours = place_colours(36)
+    colours = place_colours([str(number) for number in range(36)])
     assert len({tuple(colour) for colour in colours.round(3).tolist()}) == 36
     assert ((colours >= 0) & (colours <= 1)).all()
 

@@ -1,5 +1,6 @@
 """The table for the terminal."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -41,6 +42,7 @@ def test_the_whole_table_of_a_small_case() -> None:
         "change latency     1 frames, median of 1 change of place\n"
         "ECE                0.000   (15 bins; 0 is calibrated)\n"
         "log loss           0.693   (nats per frame; 0 is best)\n"
+        "risk-coverage      0.500   (area; of the surest half 50.0 % are right)\n"
         "sequences          2: 33.3 % (day) to 100.0 % (night)\n"
         "\n"
         "  #  place    frames  precision     recall\n"
@@ -80,6 +82,15 @@ def test_what_is_undefined_is_a_dash() -> None:
     text = format_evaluation(evaluate([make("s", ["a", "b"], ["a"], ["a"])]))
     assert "change latency     – (0 changes of place)" in text
     assert "  2  b             0          –          –" in text
+
+
+def test_new_places_have_a_line_where_they_were_asked_for() -> None:
+    made = make("s", ["a"], ["a", "a", "z"], ["a", "a", "unknown"])
+    text = format_evaluation(evaluate([replace(made, unknown=np.array([0.1, 0.3, 0.8]))]))
+    assert "unknown AUROC      1.000   (1 frames of places without a column, 2 of others)" in text
+    text = format_evaluation(evaluate([replace(made, truth=("a",) * 3, unknown=np.array([0.1, 0.3, 0.8]))]))
+    assert "unknown AUROC      –   (0 frames of places without a column, 3 of others)" in text
+    assert "unknown AUROC" not in format_evaluation(evaluate([make("s", ["a"], ["a"], ["a"])]))
 
 
 def test_a_shortened_name_keeps_both_ends() -> None:

@@ -1,0 +1,94 @@
+"""Calibration of a MODEL/ folder on labelled sequences that trained nothing of it."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import ModelError
+from placerec.files import held_folder, write_text
+from placerec.hohmm import Beliefs
+from placerec.hohmm.calibration import Calibration, fit_calibration
+from placerec.hohmm.unknown import measure_distances
+from placerec.model.decode import _token_streams
+from placerec.model.load import PlaceModels, load_model, make_recognizer
+from placerec.model.train import MODEL_JSON, format_description
+from placerec.words import WordStream
+
+log = logging.getLogger(__name__)
+
+
+def calibrate(model: Path | str, tokens: Sequence[Path | str], *, stay: float = 0.99) -> Calibration:
+    """`placerec calibrate`: fit a temperature to the beliefs in labelled `tokens`, and keep it in model.json.
+
+    `stay`: as for `decode`; the calibration holds for decoding with the same. Frames without a label, and those of
+    places that the model does not know, are left out and counted. Raises ModelError for sequences that trained the
+    model, and if no frame is left; model.json is then as it was.
+    """
+    path = Path(model)
+    with held_folder(path) if path.is_dir() else nullcontext():
+        models = load_model(path)
+        streams = _token_streams(tokens, models)
+        _refuse_training(models, streams)
+        calibration = fit_calibration(*_judged(models, _decoded(models, streams, stay)))
+        found = {
+            **calibration.to_json(),
+            "distances": _measured(models, streams),
+            "options": {"stay": stay},
+            "sequences": [stream.name for stream in streams],
+        }
+        write_text(path / MODEL_JSON, format_description({**models.description, "calibration": found}))
+    losses = calibration.log_loss_before, calibration.log_loss_after
+    log.info("%s: temperature %g, log loss %.3f -> %.3f on these frames", model, calibration.temperature, *losses)
+    return calibration
+
+
+def _refuse_training(models: PlaceModels, streams: Sequence[WordStream]) -> None:
+    trained = {item["name"] if isinstance(item, Mapping) else item for item in models.description.get("sequences", ())}
+    for stream in streams:
+        if stream.name in trained:
+            raise ModelError(
+                f"{stream.name}: trained {models.path}, which is surer of it than of anything new; "
+                "calibrate on labelled sequences that trained neither the words nor the models"
+            )
+
+
+def _decoded(models: PlaceModels, streams: Sequence[WordStream], stay: float) -> list[Beliefs]:
+    recognizer = make_recognizer(models, stay=stay)
+    return [recognizer.decode(stream) for stream in streams]
+
+
+def _judged(models: PlaceModels, decoded: Sequence[Beliefs]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The beliefs (n, C) of all frames that are labelled with a place of the model, and its column (n,)."""
+    labels = [label for beliefs in decoded for label in beliefs.truth]
+    truth = _columns(models, labels)
+    usable = truth >= 0
+    unlabelled, strange = labels.count(""), int((~usable).sum()) - labels.count("")
+    if unlabelled or strange:
+        log.info("left out: %d frames without a label, %d of places that the model does not know", unlabelled, strange)
+    if not usable.any():
+        names = ", ".join(beliefs.name for beliefs in decoded[:3]) + (", ..." if len(decoded) > 3 else "")
+        raise ModelError(
+            f"{names}: no frame is labelled with a place of {models.path}; calibration needs labelled sequences"
+        )
+    return np.concatenate([beliefs.belief for beliefs in decoded])[usable], truth[usable]
+
+
+def _columns(models: PlaceModels, labels: Sequence[str]) -> NDArray[np.int64]:
+    column = {place: number for number, place in enumerate(models.models)}
+    return np.array([column.get(label, -1) for label in labels], dtype=np.int64)
+
+
+def _measured(models: PlaceModels, streams: Sequence[WordStream]) -> dict[str, float] | None:
+    """How the distances of these frames differ from those in training, for `unknown`; None where there are none."""
+    stored: Mapping[str, Mapping[str, int]] | None = models.description.get("distances")
+    if not stored:
+        return None
+    histograms = [{int(b): count for b, count in stored.get(place, {}).items()} for place in models.models]
+    truth = _columns(models, [label for stream in streams for label in stream.places])
+    distances = np.concatenate([stream.distances for stream in streams])
+    measured = measure_distances(distances[truth >= 0], truth[truth >= 0], histograms)
+    return measured and {"shift": measured[0], "variance": measured[1]}

@@ -1,0 +1,114 @@
+"""Calibration of a model folder: what it is fitted on, what it leaves in model.json, what it refuses."""
+
+import json
+import logging
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small import run_through, write_tokens
+
+from placerec.errors import ModelError, StreamError
+from placerec.evaluation import evaluate
+from placerec.hohmm import Calibration
+from placerec.model import calibrate, decode, load_model, train_lm
+from placerec.words import write_stream
+
+NAMES = tuple(f"run{number}" for number in range(1, 6))
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Path:
+    """Tokens of five runs, and a model of the first two."""
+    write_tokens(tmp_path / "tokens", NAMES)
+    train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model")
+    return tmp_path
+
+
+def described(model: Path) -> dict[str, Any]:
+    description: dict[str, Any] = json.loads((model / "model.json").read_text())
+    return description
+
+
+def test_the_temperature_is_kept_with_what_it_was_fitted_on(world: Path) -> None:
+    before = described(world / "model")
+    found = calibrate(world / "model", [world / "tokens/run3.tsv", world / "tokens/run4.tsv"], stay=0.9)
+    after = described(world / "model")
+    kept = after.pop("calibration")
+    before.pop("calibration", None)
+    assert after == before
+    assert Calibration.from_json(kept) == found
+    assert (kept["options"], kept["sequences"], kept["frames"]) == ({"stay": 0.9}, ["run3", "run4"], 120)
+    load_model(world / "model")
+
+
+def test_the_loss_is_that_of_what_decode_gives(world: Path) -> None:
+    found = calibrate(world / "model", [world / "tokens/run3.tsv"])
+    (beliefs,) = decode([world / "tokens/run3.tsv"], world / "model")
+    assert evaluate([beliefs]).log_loss == pytest.approx(found.log_loss_before, rel=1e-5)
+    calibrated = evaluate([replace(beliefs, belief=found.apply(beliefs.belief))])
+    assert calibrated.log_loss == pytest.approx(found.log_loss_after, rel=1e-5)
+    assert calibrated.log_loss <= found.log_loss_before + 1e-6
+    assert calibrated.accuracy == evaluate([beliefs]).accuracy
+
+
+def test_a_second_calibration_replaces_the_first(world: Path) -> None:
+    calibrate(world / "model", [world / "tokens/run3.tsv"])
+    first = (world / "model/model.json").read_bytes()
+    calibrate(world / "model", [world / "tokens/run4.tsv"])
+    assert described(world / "model")["calibration"]["sequences"] == ["run4"]
+    calibrate(world / "model", [world / "tokens/run3.tsv"])
+    assert (world / "model/model.json").read_bytes() == first
+
+
+def test_distances_are_measured_where_training_had_them(world: Path) -> None:
+    path = world / "model/model.json"
+    description = described(world / "model")
+    # Training: log2 distances of 0.0625 in all places. Held out: 2, an octave out, and one frame without.
+    description["distances"] = {place: {"0": 5} for place in description["places"]}
+    path.write_text(json.dumps(description))
+    stream = run_through("run3", 2)
+    write_stream(replace(stream, distances=np.array([np.nan, *[2.0] * 59])), world / "run3.tsv")
+    calibrate(world / "model", [world / "run3.tsv"])
+    measured = described(world / "model")["calibration"]["distances"]
+    assert measured == pytest.approx({"shift": 1 - 1 / 16, "variance": 0})
+    calibrate(world / "model", [world / "tokens/run4.tsv"])
+    assert described(world / "model")["calibration"]["distances"] is None
+
+
+@pytest.mark.parametrize("as_record", [False, True])
+def test_training_sequences_are_refused_with_the_reason(world: Path, as_record: bool) -> None:
+    path = world / "model/model.json"
+    description = described(world / "model")
+    listed = [{"name": name, "visits": {"hall": 2}} for name in ("run1", "run2")] if as_record else ["run1", "run2"]
+    path.write_text(json.dumps(description | {"sequences": listed}))
+    before = path.read_bytes()
+    with pytest.raises(ModelError) as raised:
+        calibrate(world / "model", [world / "tokens/run3.tsv", world / "tokens/run2.tsv"])
+    assert str(raised.value) == (
+        f"run2: trained {world / 'model'}, which is surer of it than of anything new; "
+        "calibrate on labelled sequences that trained neither the words nor the models"
+    )
+    assert path.read_bytes() == before
+
+
+def test_frames_without_a_known_label_are_left_out_and_counted(world: Path, caplog: pytest.LogCaptureFixture) -> None:
+    stream = run_through("run3", 2)
+    places = ("", "", "attic", *stream.places[3:])
+    write_stream(replace(stream, places=places), world / "run3.tsv")
+    with caplog.at_level(logging.INFO, "placerec"):
+        found = calibrate(world / "model", [world / "run3.tsv"])
+    assert found.frames == 57
+    assert "left out: 2 frames without a label, 1 of places that the model does not know" in caplog.messages
+
+
+def test_no_labelled_frame_is_an_error(world: Path) -> None:
+    stream = run_through("run3", 2)
+    write_stream(replace(stream, places=("",) * 60), world / "run3.tsv")
+    with pytest.raises(ModelError, match=r"^run3: no frame is labelled with a place of .*; calibration needs labelled"):
+        calibrate(world / "model", [world / "run3.tsv"])
+    with pytest.raises(StreamError, match="no such file"):
+        calibrate(world / "model", [world / "run9.tsv"])
+    assert described(world / "model").get("calibration") is None
