@@ -99,27 +99,47 @@ def _lowpass_transfer(side: int) -> Floats:
 def _filter_means(whitened: Floats, border: int, orientations: tuple[int, ...], blocks: int) -> Floats:
     extended = _mirror(whitened, border, border, border, border)
     rows, columns = extended.shape
-    # OpenCV transforms complex arrays four times faster than real ones, and the factor 1 / (rows * columns) of the
-    # inverse is cheaper paid here once.
-    plane = np.zeros((rows, columns, 2), np.float32)
-    plane[..., 0] = extended
-    spectrum = cast(Floats, cv2.dft(plane, flags=cv2.DFT_SCALE))
+    spectrum = _spectrum(extended)
     filters: Iterable[Floats]
     if rows * columns <= _CACHED_PIXELS:
         filters = _bank(rows, columns, orientations)
     else:
         filters = _filters(rows, columns, orientations)
     inside = slice(border, rows - border), slice(border, columns - border)
-    bands = [_band_sums(_magnitude(spectrum, transfer, inside), blocks) for transfer in filters]
+    product = np.empty_like(spectrum)
+    bands = []
+    for transfer in filters:
+        np.multiply(spectrum, transfer, out=product)
+        magnitude: Floats = np.abs(_response(product)[inside])
+        bands.append(_band_sums(magnitude, blocks))
     return _block_means(np.stack(bands), rows - 2 * border, blocks)
 
 
-def _magnitude(spectrum: Floats, transfer: Floats, inside: tuple[slice, slice]) -> Floats:
-    """|z| of the image filtered by one transfer function, without the border."""
-    product = spectrum * transfer
-    response = cast(Floats, cv2.dft(product, dst=product, flags=cv2.DFT_INVERSE))
-    magnitude: Floats = np.abs(response.view(np.complex64)[(*inside, 0)])
-    return magnitude
+@lru_cache(maxsize=1)
+def _has_ipp() -> bool:
+    """Whether OpenCV has Intel's transforms (its wheels for x86 do); its own are slower than scipy's."""
+    return bool(cv2.ipp.useIPP())
+
+
+def _spectrum(image: Floats) -> Floats:
+    """The DFT divided by the number of pixels: (h, w, 2), real and imaginary parts."""
+    if not _has_ipp():
+        spectrum = scipy.fft.fft2(image, norm="forward")
+        return cast(Floats, spectrum.view(np.float32).reshape(*image.shape, 2))
+    # OpenCV transforms complex arrays four times faster than real ones, and the factor of the inverse transforms is
+    # cheaper paid here once.
+    plane = np.zeros((*image.shape, 2), np.float32)
+    plane[..., 0] = image
+    return cast(Floats, cv2.dft(plane, dst=plane, flags=cv2.DFT_SCALE))
+
+
+def _response(spectrum: Floats) -> NDArray[np.complex64]:
+    """The inverse DFT without a factor, complex (h, w); the spectrum's memory is used up."""
+    if _has_ipp():
+        cv2.dft(spectrum, dst=spectrum, flags=cv2.DFT_INVERSE)
+        return spectrum.view(np.complex64)[..., 0]
+    numbers = spectrum.view(np.complex64)[..., 0]
+    return cast(NDArray[np.complex64], scipy.fft.ifft2(numbers, norm="forward", overwrite_x=True))
 
 
 def _edges(length: int, blocks: int) -> list[int]:
@@ -128,9 +148,11 @@ def _edges(length: int, blocks: int) -> list[int]:
 
 def _band_sums(magnitude: Floats, blocks: int) -> Floats:
     """(blocks, w): the sum over the rows of each row of blocks."""
-    # A third of the time of np.add.reduceat, and there are 24 of these an image.
-    bands = pairwise(_edges(len(magnitude), blocks))
-    return cast(Floats, np.concatenate([cv2.reduce(magnitude[a:b], 0, cv2.REDUCE_SUM) for a, b in bands]))
+    height, width = magnitude.shape
+    if height % blocks == 0:
+        sums: Floats = magnitude.reshape(blocks, -1, width).sum(axis=1)
+        return sums
+    return np.stack([magnitude[a:b].sum(axis=0) for a, b in pairwise(_edges(height, blocks))])
 
 
 def _block_means(bands: Floats, height: int, blocks: int) -> Floats:
