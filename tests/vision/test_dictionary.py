@@ -130,11 +130,13 @@ def test_streamed_descriptors_are_checked() -> None:
 BLAS = """
 import numpy as np
 from placerec.vision import DescriptorSpec, Dictionary
+from placerec.vision.som import train_som
 rng = np.random.default_rng(0)
 rows = (rng.random((30, 384))[rng.integers(30, size=1500)] + 0.3 * rng.random((1500, 384))).astype(np.float32)
-for rule, epochs in (("batch", 6), ("online", 1)):
-    made = Dictionary.fit(rows, spec=DescriptorSpec(), size=12, components=40, rule=rule, epochs=epochs)
-    print(made.fingerprint, made.words(rows[:100] + np.float32(0.01))[1].tobytes().hex())
+made = Dictionary.fit(rows, spec=DescriptorSpec(), size=12, components=40, epochs=6)
+print(made.fingerprint, made.words(rows[:100] + np.float32(0.01))[1].tobytes().hex())
+online = train_som(rows[:300, :40], 12, rng=rng, rule="online", epochs=1)
+print(online.codebook.tobytes().hex())
 """
 
 
