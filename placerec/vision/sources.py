@@ -74,7 +74,7 @@ def train_dictionary(
         dictionary.save(partial)
         _report(dictionary)
         if others:
-            more = describe(others, spec, progress=lambda done, _: tell(seen + done, seen + unseen))
+            more = describe(others, described.spec, progress=lambda done, _: tell(seen + done, seen + unseen))
             _report_held_out(dictionary.measure(more))
     return dictionary
 
