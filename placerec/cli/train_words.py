@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from placerec.cli.options import (
+    PATH,
     FiniteRange,
     descriptor_options,
     output_option,
@@ -38,7 +39,7 @@ from placerec.cli.options import (
     "--epochs",
     type=click.IntRange(min=1),
     default=None,
-    help="Passes over the frames.  [default: until stable, at most 50]",
+    help="Passes over the frames.  [default: 50, or fewer if the words settle]",
 )
 @click.option(
     "--units",
@@ -46,6 +47,27 @@ from placerec.cli.options import (
     default="live",
     show_default=True,
     help="Whether units that no training frame hit can be words.",
+)
+@click.option(
+    "--rule",
+    type=click.Choice(["batch", "online"]),
+    default="batch",
+    show_default=True,
+    help="All frames at once, or Kohonen's one after the other (slow, for comparison).",
+)
+@click.option(
+    "--width",
+    type=FiniteRange(min=0, min_open=True),
+    default=0.5,
+    show_default=True,
+    help="Final width of the neighbourhood, in units; it starts at size/2.",
+)
+@click.option(
+    "--held-out",
+    metavar="SOURCE",
+    multiple=True,
+    type=PATH,
+    help="Images that train nothing: how well the map represents them is told.  [repeatable]",
 )
 @descriptor_options
 @output_option("words.npz", "The dictionary to write.")
@@ -59,6 +81,9 @@ def train_words(
     fraction: float,
     epochs: int | None,
     units: str,
+    rule: str,
+    width: float,
+    held_out: tuple[Path, ...],
     variant: str,
     image_size: int,
     fit: str,
@@ -83,5 +108,8 @@ def train_words(
             fraction=fraction,
             epochs=epochs,
             units=units,
+            rule=rule,
+            width=width,
+            held_out=held_out,
             progress=progress,
         )

@@ -1,6 +1,7 @@
 """The visual dictionary: descriptor -> PCA -> unit of a self-organising map -> word."""
 
 import logging
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,12 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.version import __version__
+from placerec.vision.chunks import CHUNK, Rows, Source, chunks
+from placerec.vision.describe import Descriptors
 from placerec.vision.images import Gray
-from placerec.vision.pca import Pca, fit_pca, moments, project
-from placerec.vision.som import Progress, best_units, quantisation_error, topographic_error, train_som
+from placerec.vision.pca import Pca, fit_pca, moments, project, projected
+from placerec.vision.quality import MapQuality, map_quality
+from placerec.vision.som import RULES, WIDTH, Progress, best_units, train_som
 from placerec.vision.spec import DescriptorSpec, descriptor
 from placerec.vision.storage import Arrays, fingerprint, read_npz, write_npz
 
@@ -40,6 +44,8 @@ class Training:
     fraction: float = 1.0
     epochs: int | None = None
     units: str = "live"
+    rule: str = "batch"
+    width: float = WIDTH
 
     def __post_init__(self) -> None:
         for name in ("size", "components", "epochs"):
@@ -50,15 +56,18 @@ class Training:
             raise VisionError(f"seed {self.seed} cannot be used; give a number of 0 or more")
         if not isinstance(self.fraction, float | int) or not 0 < self.fraction <= 1:
             raise VisionError(f"fraction {self.fraction} cannot be used; give a number above 0 and up to 1")
-        if self.units not in UNITS:
-            raise VisionError(f"no choice of units is called {self.units!r}; choose one of {', '.join(UNITS)}")
+        if not isinstance(self.width, float | int) or not 0 < self.width < np.inf:
+            raise VisionError(f"width {self.width} cannot be used; give a number above 0")
+        for name, value, choices in (("choice of units", self.units, UNITS), ("rule", self.rule, RULES)):
+            if value not in choices:
+                raise VisionError(f"no {name} is called {value!r}; choose one of {', '.join(choices)}")
 
 
 @dataclass(frozen=True)
 class Quality:
-    """What came of it, over the frames that were used: shares are of 1, the errors those of the map's makers.
+    """What came of it, over the frames that were used; the errors, entropy and dead units are those of `MapQuality`.
 
-    `needed`: the components that would keep 99 % of the variance.
+    `explained`: the share of the variance that the components keep; `needed`: the components that would keep 99 %.
     """
 
     frames: int
@@ -68,6 +77,8 @@ class Quality:
     needed: int
     quantisation_error: float
     topographic_error: float
+    entropy: float
+    dead: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +95,7 @@ class Dictionary:
     @classmethod
     def fit(
         cls,
-        descriptors: NDArray[np.float32],
+        descriptors: Source,
         *,
         spec: DescriptorSpec,
         size: int = 10,
@@ -93,28 +104,37 @@ class Dictionary:
         fraction: float = 1.0,
         epochs: int | None = None,
         units: str = "live",
+        rule: str = "batch",
+        width: float = WIDTH,
         progress: Progress | None = None,
     ) -> "Dictionary":
         """Learn size x size words from descriptors (n, spec.length) in time order (readings A25-A29).
 
+        `descriptors`: an array, a memory map, or a function that gives an iterator over float32 pieces of any length
+        and is called once for every pass: its memory then does not grow with n but for four bytes a frame.
         `fraction`: the share of the frames, drawn by the seed, that PCA and map see. `units`: answer with those
         that at least one training frame hit (`live`: no language model can know the others), or with `all`.
-        `progress`: called with epoch, epochs and quantisation error. Same input, options and seed: same bytes.
+        `rule`, `width`, `epochs`: how the map learns, see `train_som`. `progress`: called with epoch, epochs and
+        quantisation error. Same descriptors, options and seed: same bytes.
         Raises VisionError for unusable descriptors or options.
         """
-        training = Training(size, components, seed, fraction, epochs, units)
-        rows = _check(descriptors, spec)
+        training = Training(size, components, seed, fraction, epochs, units, rule, width)
         rng = np.random.Generator(np.random.PCG64(seed))
-        n = len(rows)
-        if fraction < 1 and n:
-            rows = rows[np.sort(rng.permutation(n)[: max(1, round(fraction * n))])]
-        pca = fit_pca(moments(rows), components)
-        if len(rows) < size * size:
-            log.warning("%d frames cannot fill the %d words of a map of size %d", len(rows), size * size, size)
-        codes = project(rows, pca)
-        som = train_som(codes, size, rng=rng, epochs=epochs, progress=progress)
-        errors = [round(f(codes, som.codebook), 9) for f in (quantisation_error, topographic_error)]
-        quality = Quality(n, len(rows), som.epochs, pca.explained, pca.needed, *errors)
+        source = _checked(descriptors, spec)
+        frames = None
+        if fraction < 1:
+            frames = len(source) if isinstance(source, np.ndarray) else sum(map(len, chunks(source)))
+            source = _drawn(source, frames, fraction, rng)
+        data = moments(source)
+        pca = fit_pca(data, components)
+        if data.n < size * size:
+            log.warning("%d frames cannot fill the %d words of a map of size %d", data.n, size * size, size)
+        # What came in memory stays there, at a fifth of its size; what was streamed is projected anew in every pass.
+        codes = projected(source, pca) if callable(descriptors) else np.concatenate(list(projected(source, pca)()))
+        som = train_som(codes, size, rng=rng, rule=rule, width=width, epochs=epochs, progress=progress)
+        got = map_quality(codes, som.codebook, som.hits)
+        errors = got.quantisation_error, got.topographic_error, got.entropy, got.dead
+        quality = Quality(frames or data.n, data.n, som.epochs, pca.explained, pca.needed, *errors)
         return cls(spec, pca, som.codebook, som.hits, training, quality)
 
     @property
@@ -133,13 +153,19 @@ class Dictionary:
         """SHA-256 of all that the file holds, 64 hexadecimal digits."""
         return fingerprint(self._arrays(), self._meta())
 
-    def words(self, descriptors: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    def words(self, descriptors: Rows | Descriptors) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
         """The unit of every descriptor (n, spec.length), int64 (n,), and its distance in PCA space, float32 (n,).
 
-        A frame's answer does not depend on the frames around it. Raises VisionError for unusable descriptors.
+        A frame's answer does not depend on the frames around it. Raises VisionError for unusable descriptors, and for
+        `Descriptors` of another kind; of what kind a bare array is only its maker can know.
         """
-        codes = project(_check(descriptors, self.spec), self.pca)
-        return best_units(codes, self.codebook, self.hits > 0 if self.training.units == "live" else None)
+        return best_units(
+            self._codes(descriptors), self.codebook, self.hits > 0 if self.training.units == "live" else None
+        )
+
+    def measure(self, descriptors: Rows | Descriptors) -> MapQuality:
+        """How well the map represents these frames, for instance of recordings that trained nothing."""
+        return map_quality(self._codes(descriptors), self.codebook, self.hits)
 
     def see(self, image: Gray) -> str:
         """The word of one grey image (h, w) of 0..255; VisionError for an image that cannot be used."""
@@ -160,6 +186,16 @@ class Dictionary:
             remedy = "name another" if str(error) == "no such file" else _REMEDY
             raise VisionError(f"{path}: {error}; {remedy}") from error
 
+    def _codes(self, descriptors: Rows | Descriptors) -> Rows:
+        if isinstance(descriptors, Descriptors):
+            if descriptors.spec != self.spec:
+                raise VisionError(
+                    f"the descriptors are of another kind ({descriptors.spec}) than the dictionary's ({self.spec}); "
+                    "describe the images with the dictionary's"
+                )
+            descriptors = descriptors.values
+        return project(_check(descriptors, self.spec), self.pca)
+
     def _arrays(self) -> Arrays:
         pca = {name: getattr(self.pca, name) for name in ("mean", "components", "variances")}
         return {**pca, "codebook": self.codebook, "hits": self.hits}
@@ -175,17 +211,48 @@ class Dictionary:
         }
 
 
-def _check(descriptors: NDArray[np.float32], spec: DescriptorSpec) -> NDArray[np.float32]:
+def _checked(descriptors: Source, spec: DescriptorSpec) -> Source:
+    if not callable(descriptors):
+        return _check(descriptors, spec)
+    give = descriptors
+
+    def pieces() -> Iterator[Rows]:
+        first = 0
+        for piece in give():
+            yield _check(piece, spec, first)
+            first += len(piece)
+
+    return pieces
+
+
+def _check(descriptors: Rows, spec: DescriptorSpec, first: int = 0) -> Rows:
+    """The descriptors as float32; `first`: the index of their first row, for the message."""
     rows = np.asarray(descriptors)
     if rows.ndim != 2 or rows.dtype.kind not in "uif":
         raise VisionError(f"descriptors are float32 (n, {spec.length}), and these are {rows.dtype} {rows.shape}")
     if rows.shape[1] != spec.length:
         raise VisionError(f"the descriptors have {rows.shape[1]} values, and the dictionary's have {spec.length}")
     rows = rows.astype(np.float32, copy=False)
-    good = np.isfinite(rows).all(axis=1)
-    if not good.all():
-        raise VisionError(f"descriptor {int(good.argmin())} (from 0) holds NaN or infinite values; leave it out")
+    for start in range(0, len(rows), CHUNK):
+        good = np.isfinite(rows[start : start + CHUNK]).all(axis=1)
+        if not good.all():
+            row = first + start + int(good.argmin())
+            raise VisionError(f"descriptor {row} (from 0) holds NaN or infinite values; leave it out")
     return rows
+
+
+def _drawn(source: Source, n: int, fraction: float, rng: np.random.Generator) -> Source:
+    """`fraction` of the n rows of a source, at least one, in their order."""
+    kept = np.zeros(n, np.bool_)
+    kept[rng.permutation(n)[: max(1, round(fraction * n))]] = True
+
+    def pieces() -> Iterator[Rows]:
+        first = 0
+        for rows in chunks(source):
+            yield rows[kept[first : first + len(rows)]]
+            first += len(rows)
+
+    return pieces
 
 
 def _restored(arrays: Arrays, meta: dict[str, Any]) -> Dictionary:

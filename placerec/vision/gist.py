@@ -5,6 +5,7 @@ cites a steerable pyramid of the same shape (4 scales x 6 orientations x 4 x 4 b
 authors' own published successor. Both variants are exact: nothing is approximated to save time.
 """
 
+import threading
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
@@ -99,38 +100,76 @@ def _lowpass_transfer(side: int) -> Floats:
 def _filter_means(whitened: Floats, border: int, orientations: tuple[int, ...], blocks: int) -> Floats:
     extended = _mirror(whitened, border, border, border, border)
     rows, columns = extended.shape
-    # OpenCV transforms complex arrays four times faster than real ones, and the factor 1 / (rows * columns) of the
-    # inverse is cheaper paid here once.
-    plane = np.zeros((rows, columns, 2), np.float32)
-    plane[..., 0] = extended
-    spectrum = cast(Floats, cv2.dft(plane, flags=cv2.DFT_SCALE))
-    filters: Iterable[Floats]
+    spectrum = _spectrum(extended)
+    # A scale at a time where the bank is kept: fewer calls, and fewer waits of threads for the interpreter's lock.
+    groups: Iterable[Floats]
     if rows * columns <= _CACHED_PIXELS:
-        filters = _bank(rows, columns, orientations)
+        groups = _bank(rows, columns, orientations)
     else:
-        filters = _filters(rows, columns, orientations)
-    inside = slice(border, rows - border), slice(border, columns - border)
-    bands = [_band_sums(_magnitude(spectrum, transfer, inside), blocks) for transfer in filters]
-    return _block_means(np.stack(bands), rows - 2 * border, blocks)
+        groups = (transfer[None] for transfer in _filters(rows, columns, orientations))
+    height, width = rows - 2 * border, columns - 2 * border
+    bands = []
+    for transfers in groups:
+        n = len(transfers)
+        memory = _memory(n * (2 * rows * columns + height * width))
+        product = memory[: n * 2 * rows * columns].reshape(n, rows, columns, 2)
+        magnitudes = memory[n * 2 * rows * columns :].reshape(n, height, width)
+        np.multiply(spectrum, transfers, out=product)
+        np.abs(_responses(product)[:, border : rows - border, border : columns - border], out=magnitudes)
+        bands.append(_band_sums(magnitudes, blocks))
+    return _block_means(np.concatenate(bands), height, blocks)
 
 
-def _magnitude(spectrum: Floats, transfer: Floats, inside: tuple[slice, slice]) -> Floats:
-    """|z| of the image filtered by one transfer function, without the border."""
-    product = spectrum * transfer
-    response = cast(Floats, cv2.dft(product, dst=product, flags=cv2.DFT_INVERSE))
-    magnitude: Floats = np.abs(response.view(np.complex64)[(*inside, 0)])
-    return magnitude
+_kept = threading.local()
+
+
+def _memory(count: int) -> Floats:
+    """Memory for `count` numbers that the thread uses again: fresh pages would cost as much as the transforms."""
+    memory: Floats = getattr(_kept, "memory", np.empty(0, np.float32))
+    if len(memory) < count:
+        memory = _kept.memory = np.empty(count, np.float32)
+    return memory[:count]
+
+
+@lru_cache(maxsize=1)
+def _has_ipp() -> bool:
+    """Whether OpenCV has Intel's transforms (its wheels for x86 do); its own are slower than scipy's."""
+    return bool(cv2.ipp.useIPP())
+
+
+def _spectrum(image: Floats) -> Floats:
+    """The DFT divided by the number of pixels: (h, w, 2), real and imaginary parts."""
+    if not _has_ipp():
+        spectrum = scipy.fft.fft2(image, norm="forward")
+        return cast(Floats, spectrum.view(np.float32).reshape(*image.shape, 2))
+    # OpenCV transforms complex arrays four times faster than real ones, and the factor of the inverse transforms is
+    # cheaper paid here once.
+    plane = np.zeros((*image.shape, 2), np.float32)
+    plane[..., 0] = image
+    return cast(Floats, cv2.dft(plane, dst=plane, flags=cv2.DFT_SCALE))
+
+
+def _responses(spectra: Floats) -> NDArray[np.complex64]:
+    """The inverse DFTs without a factor, complex (n, h, w), of (n, h, w, 2), whose memory is used up."""
+    numbers = spectra.view(np.complex64)[..., 0]
+    if not _has_ipp():
+        return cast(NDArray[np.complex64], scipy.fft.ifft2(numbers, norm="forward", overwrite_x=True))
+    for spectrum in spectra:
+        cv2.dft(spectrum, dst=spectrum, flags=cv2.DFT_INVERSE)
+    return numbers
 
 
 def _edges(length: int, blocks: int) -> list[int]:
     return [k * length // blocks for k in range(blocks + 1)]
 
 
-def _band_sums(magnitude: Floats, blocks: int) -> Floats:
-    """(blocks, w): the sum over the rows of each row of blocks."""
-    # A third of the time of np.add.reduceat, and there are 24 of these an image.
-    bands = pairwise(_edges(len(magnitude), blocks))
-    return cast(Floats, np.concatenate([cv2.reduce(magnitude[a:b], 0, cv2.REDUCE_SUM) for a, b in bands]))
+def _band_sums(magnitudes: Floats, blocks: int) -> Floats:
+    """(n, blocks, w): the sums of (n, h, w) over the rows of each row of blocks."""
+    n, height, width = magnitudes.shape
+    if height % blocks == 0:
+        sums: Floats = magnitudes.reshape(n, blocks, -1, width).sum(axis=2)
+        return sums
+    return np.stack([magnitudes[:, a:b].sum(axis=1) for a, b in pairwise(_edges(height, blocks))], axis=1)
 
 
 def _block_means(bands: Floats, height: int, blocks: int) -> Floats:
@@ -143,11 +182,16 @@ def _block_means(bands: Floats, height: int, blocks: int) -> Floats:
 
 @lru_cache(maxsize=4)
 def _bank(rows: int, columns: int, orientations: tuple[int, ...]) -> tuple[Floats, ...]:
-    return tuple(_filters(rows, columns, orientations))
+    """The transfer functions of each scale, (orientations, rows, columns, 2), read-only."""
+    filters = _filters(rows, columns, orientations)
+    scales = tuple(np.stack([next(filters) for _ in range(count)]) for count in orientations)
+    for transfers in scales:
+        transfers.flags.writeable = False
+    return scales
 
 
 def _filters(rows: int, columns: int, orientations: tuple[int, ...]) -> Iterator[Floats]:
-    """The Gabor transfer functions (gist/spec.md section 3), each (rows, columns, 2), read-only.
+    """The Gabor transfer functions (gist/spec.md section 3), each (rows, columns, 2), finest scale first.
 
     They are real; every value is there twice, for the real and the imaginary part that it multiplies.
     """
@@ -162,6 +206,4 @@ def _filters(rows: int, columns: int, orientations: tuple[int, ...]) -> Iterator
         for turn in range(count):
             tau = angle + np.pi * turn / count
             tau[tau > np.pi] -= 2 * np.pi
-            transfer = np.repeat(np.exp(radial - sharpness * tau**2).astype(np.float32)[..., None], 2, axis=2)
-            transfer.flags.writeable = False
-            yield transfer
+            yield np.repeat(np.exp(radial - sharpness * tau**2).astype(np.float32)[..., None], 2, axis=2)

@@ -1,7 +1,6 @@
 """Principal components from one pass over the data: centred, not whitened (readings A26)."""
 
 import logging
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.vision import exact
+from placerec.vision.chunks import CHUNK, Source, Stream, chunks
 
 log = logging.getLogger(__name__)
 
@@ -53,18 +53,12 @@ class Pca:
     needed: int
 
 
-def moments(rows: NDArray[np.float32]) -> Moments:
-    """The moments of (n, d) float32 in one pass; rows may be a memory map."""
-    total = Moments.none(rows.shape[1])
-    for chunk in chunks(rows):
-        total = total.updated(chunk)
-    return total
-
-
-def chunks(rows: NDArray[np.float32]) -> Iterator[NDArray[np.float32]]:
-    """The rows in pieces of a fixed size, so that the order of every sum is fixed."""
-    for first in range(0, len(rows), exact.TERMS):
-        yield rows[first : first + exact.TERMS]
+def moments(source: Source) -> Moments:
+    """The moments of (n, d) float32 in one pass, from memory, a memory map or a stream; the same however it is cut."""
+    total = None
+    for rows in chunks(source):
+        total = (total or Moments.none(rows.shape[1])).updated(rows)
+    return total or Moments.none(0)
 
 
 def fit_pca(data: Moments, components: int = 80) -> Pca:
@@ -100,7 +94,12 @@ def project(rows: NDArray[np.float32], pca: Pca) -> NDArray[np.float32]:
     """Coordinates float32 (n, k) of rows (n, d); a row's are the same whatever other rows are there."""
     grid = pca.components.T.astype(np.float64)
     codes = np.empty((len(rows), len(pca.components)), np.float32)
-    for first in range(0, len(rows), exact.TERMS):
-        piece = slice(first, first + exact.TERMS)
+    for first in range(0, len(rows), CHUNK):
+        piece = slice(first, first + CHUNK)
         codes[piece] = exact.product(rows[piece] - pca.mean, grid)
     return codes
+
+
+def projected(source: Source, pca: Pca) -> Stream:
+    """The coordinates of a source of rows, computed anew each time they are asked for."""
+    return lambda: (project(rows, pca) for rows in chunks(source))

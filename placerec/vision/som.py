@@ -1,4 +1,4 @@
-"""A batch self-organising map on a square lattice, row-major, and the search for best units (readings A28)."""
+"""Self-organising maps on a square lattice, row-major: training and the search for best units (readings A28)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,13 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
+from placerec.vision.chunks import CHUNK, Rows, Source, again, chunks
+
 Progress = Callable[[int, int, float], None]  # epoch (from 1), epochs, quantisation error
 
+RULES = ("batch", "online")
 EPOCHS = 50
-LAST_WIDTH = 0.5  # 1.0 and more gives worse words on small maps, and no later step uses the topology
+WIDTH = 0.5  # 1.0 and more gives worse words on small maps, and no later step uses the topology
+_RATES = (0.5, 0.01)  # the learning rate of the on-line rule, first and last
 _JITTER = 0.05
 _SETTLED = 0.001  # training ends when a smaller share of the frames changes its unit at the last width
-_CHUNK = 4096
 _TINY = 1e-290  # below this a neighbourhood's weight has lost its digits to underflow
 
 
@@ -27,39 +30,100 @@ class Som:
 
 
 def train_som(
-    codes: NDArray[np.float32],
+    source: Source,
     size: int,
     *,
     rng: np.random.Generator,
+    rule: str = "batch",
+    width: float = WIDTH,
     epochs: int | None = None,
     progress: Progress | None = None,
 ) -> Som:
-    """Train size x size units on PCA coordinates (n, k), largest variance first.
+    """Train size x size units on PCA coordinates (n, k), largest variance first, from memory or streamed.
 
-    The width of the Gaussian neighbourhood falls exponentially from size/2 to 0.5 units in the first half of the
-    epochs and stays there in the second, which ends early once fewer than 0.1 % of the frames change their unit.
-    `epochs`: None is 50. The result depends on codes, options and the generator's state alone, not on the BLAS.
+    `batch`: the width of the Gaussian neighbourhood falls exponentially from size/2 to `width` units in the first
+    half of the epochs and stays there in the second, which ends early once fewer than 0.1 % of the frames change their
+    unit. Every epoch streams the source once: four bytes a frame are all that is kept. `online` is Kohonen's rule of
+    1990: one frame after the other in random order pulls its unit and the neighbours, while width (exponentially, as
+    above) and learning rate (linearly, 0.5 to 0.01) fall over all steps; it keeps all coordinates in memory.
+
+    `epochs`: None is 50. The result depends on the rows, the options and the generator's state alone, not on the BLAS
+    nor on how the rows were cut. Raises VisionError if a streamed source changes between two passes.
     """
     epochs = EPOCHS if epochs is None else epochs
+    n, mean, deviation = _spread(source)
+    codebook = _start(mean, deviation, size, rng)
+    if rule == "online":
+        rows = np.concatenate(list(again(source, n)))
+        codebook = _online(rows, codebook, rng, width, epochs, progress)
+    else:
+        codebook, epochs = _batch(source, n, codebook, width, epochs, progress)
+    hits = np.zeros(size * size, np.int64)
+    for rows in again(source, n):
+        hits += np.bincount(_search(rows, codebook), minlength=size * size)
+    return Som(codebook, hits, epochs)
+
+
+def _batch(
+    source: Source, n: int, codebook: Rows, width: float, epochs: int, progress: Progress | None
+) -> tuple[Rows, int]:
+    """The codebook after at most `epochs` passes, and the number of passes that moved it."""
     cooling = (epochs + 1) // 2
-    widths = np.geomspace(max(size / 2, LAST_WIDTH), LAST_WIDTH, cooling) if cooling > 1 else [LAST_WIDTH]
-    codebook = _start(codes, size, rng)
-    before = np.full(len(codes), -1)
+    widths = np.geomspace(max(len(codebook) ** 0.5 / 2, width), width, cooling) if cooling > 1 else [width]
+    before = np.full(n, -1, np.int32)
     for epoch in range(1, epochs + 1):
-        units = _search(codes, codebook)
-        if epoch > cooling and np.count_nonzero(units != before) < _SETTLED * len(codes):
-            epoch -= 1
-            break
+        sums, counts = np.zeros(codebook.shape), np.zeros(len(codebook))
+        changed, first, distance = 0, 0, 0.0
+        for rows in again(source, n):
+            units = _search(rows, codebook)
+            sums += _unit_sums(rows, units, len(codebook))
+            counts += np.bincount(units, minlength=len(codebook))
+            known = before[first : first + len(rows)]
+            changed += int(np.count_nonzero(units != known))
+            known[:] = units
+            first += len(rows)
+            if progress is not None:
+                distance += float(distances(rows, codebook, units).sum())
+        if epoch > cooling and changed < _SETTLED * n:
+            return codebook, epoch - 1
         if progress is not None:
-            progress(epoch, epochs, float(_distances(codes, codebook, units).mean()))
-        codebook = _smoothed(*_unit_sums(codes, units, size * size), codebook, float(widths[min(epoch, cooling) - 1]))
-        before = units
-    hits = np.bincount(_search(codes, codebook), minlength=size * size)
-    return Som(codebook, hits.astype(np.int64), epoch)
+            progress(epoch, epochs, distance / n)
+        codebook = _smoothed(sums, counts, codebook, float(widths[min(epoch, cooling) - 1]))
+    return codebook, epochs
+
+
+def _online(
+    rows: Rows, codebook: Rows, rng: np.random.Generator, width: float, epochs: int, progress: Progress | None
+) -> Rows:
+    """Kohonen's rule; the quantisation error that `progress` is told is that of the frames as they were met."""
+    side = round(len(codebook) ** 0.5)
+    first, last = max(side / 2, width), width
+    place = np.arange(side)
+    weights = codebook.astype(np.float64)
+    pull = np.empty_like(weights)
+    steps = epochs * len(rows)
+    for epoch in range(epochs):
+        distance = 0.0
+        for step, row in enumerate(rng.permutation(len(rows)).tolist(), start=epoch * len(rows)):
+            done = step / max(steps - 1, 1)
+            np.subtract(rows[row], weights, out=pull)
+            # Not a matrix product: the order in which a BLAS adds depends on its threads.
+            squares = np.einsum("uk,uk->u", pull, pull)
+            best = int(squares.argmin())
+            distance += float(squares[best]) ** 0.5
+            rate = _RATES[0] + (_RATES[1] - _RATES[0]) * done
+            spread = -0.5 / (first * (last / first) ** done) ** 2
+            down = np.exp(spread * (place - best // side) ** 2)
+            right = np.exp(spread * (place - best % side) ** 2)
+            pull *= np.outer(rate * down, right).reshape(-1, 1)
+            weights += pull
+        if progress is not None:
+            progress(epoch + 1, epochs, distance / len(rows))
+    return weights.astype(np.float32)
 
 
 def best_units(
-    codes: NDArray[np.float32], codebook: NDArray[np.float32], live: NDArray[np.bool_] | None = None
+    codes: Rows, codebook: Rows, live: NDArray[np.bool_] | None = None
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """The nearest unit of every row of (n, k): int64 (n,), and the Euclidean distance to it: float32 (n,).
 
@@ -70,53 +134,65 @@ def best_units(
     else:
         among = np.flatnonzero(live)
         units = among[_search(codes, codebook[among])]
-    return units, _distances(codes, codebook, units).astype(np.float32)
+    return units, distances(codes, codebook, units).astype(np.float32)
 
 
-def quantisation_error(codes: NDArray[np.float32], codebook: NDArray[np.float32]) -> float:
+def quantisation_error(codes: Rows, codebook: Rows) -> float:
     """The mean distance of the rows to their nearest unit."""
-    return float(_distances(codes, codebook, _search(codes, codebook)).mean())
+    return float(distances(codes, codebook, _search(codes, codebook)).mean())
 
 
-def topographic_error(codes: NDArray[np.float32], codebook: NDArray[np.float32]) -> float:
+def topographic_error(codes: Rows, codebook: Rows) -> float:
     """The share of the rows whose second nearest unit is not one of the 8 neighbours of the nearest."""
+    return float(torn(codes, codebook, _search(codes, codebook)).mean())
+
+
+def torn(codes: Rows, codebook: Rows, nearest: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which rows (n,) have a second nearest unit that is not one of the 8 neighbours of the nearest."""
+    if len(codebook) == 1:
+        return np.zeros(len(codes), np.bool_)
     size = round(len(codebook) ** 0.5)
-    if size == 1:
-        return 0.0
-    first = _search(codes, codebook)
-    second = _search(codes, codebook, without=first)
-    rows, columns = first // size - second // size, first % size - second % size
-    return float((np.maximum(np.abs(rows), np.abs(columns)) > 1).mean())
+    second = _search(codes, codebook, without=nearest)
+    down, right = nearest // size - second // size, nearest % size - second % size
+    far: NDArray[np.bool_] = np.maximum(np.abs(down), np.abs(right)) > 1
+    return far
 
 
-def _start(codes: NDArray[np.float32], size: int, rng: np.random.Generator) -> NDArray[np.float32]:
+def _spread(source: Source) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
+    """The number of rows, and mean and standard deviation of every column, in one pass (Chan's formula)."""
+    n, mean, squares = 0, np.zeros(1), np.zeros(1)
+    for rows in chunks(source):
+        values = rows.astype(np.float64)
+        here = values.mean(axis=0)
+        step = here - mean
+        total = n + len(values)
+        squares = squares + np.square(values - here).sum(axis=0) + step**2 * (n * len(values) / total)
+        mean = mean + step * (len(values) / total)
+        n = total
+    return n, mean, np.sqrt(squares / n)
+
+
+def _start(mean: NDArray[np.float64], deviation: NDArray[np.float64], size: int, rng: np.random.Generator) -> Rows:
     """Units on the plane of the first two coordinates, two deviations to either side, jittered."""
-    width = codes.shape[1]
-    mean, deviation = codes.mean(axis=0, dtype=np.float64), codes.std(axis=0, dtype=np.float64)
-    lattice = np.zeros((size, size, width))
+    lattice = np.zeros((size, size, len(mean)))
     steps = np.linspace(-2, 2, size) if size > 1 else np.zeros(1)
     lattice[..., 0] = steps[:, None]
-    if width > 1:
+    if len(mean) > 1:
         lattice[..., 1] = steps
     lattice += _JITTER * rng.standard_normal(lattice.shape)
-    codebook: NDArray[np.float32] = (mean + deviation * lattice).astype(np.float32).reshape(size * size, width)
+    codebook: Rows = (mean + deviation * lattice).astype(np.float32).reshape(size * size, len(mean))
     return codebook
 
 
-def _unit_sums(
-    codes: NDArray[np.float32], units: NDArray[np.int64], count: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Per unit the sum (count, k) and the number (count,) of its rows, added in the order of the rows."""
-    sums = np.zeros((count, codes.shape[1]))
-    for first in range(0, len(codes), _CHUNK):
-        rows = codes[first : first + _CHUNK].astype(np.float64)
-        mine = units[first : first + _CHUNK]
-        sums += csc_array((np.ones(len(rows)), mine, np.arange(len(rows) + 1)), shape=(count, len(rows))) @ rows
-    return sums, np.bincount(units, minlength=count).astype(np.float64)
+def _unit_sums(rows: Rows, units: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+    """Per unit the sum (count, k) of its rows, added in their order."""
+    mine = csc_array((np.ones(len(rows)), units, np.arange(len(rows) + 1)), shape=(count, len(rows)))
+    sums: NDArray[np.float64] = mine @ rows.astype(np.float64)
+    return sums
 
 
 def _smoothed(
-    sums: NDArray[np.float64], counts: NDArray[np.float64], codebook: NDArray[np.float32], width: float
+    sums: NDArray[np.float64], counts: NDArray[np.float64], codebook: Rows, width: float
 ) -> NDArray[np.float32]:
     """The batch rule: weighted means over the neighbourhood; a unit that hears of no frame stays where it is."""
     size = round(len(counts) ** 0.5)
@@ -132,20 +208,16 @@ def _smoothed(
     return moved
 
 
-def _search(
-    codes: NDArray[np.float32], codebook: NDArray[np.float32], without: NDArray[np.int64] | None = None
-) -> NDArray[np.int64]:
+def _search(codes: Rows, codebook: Rows, without: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
     """The nearest unit of every row, by exact distance in float64, lowest index first; `without` (n,): not this one."""
     units = np.empty(len(codes), np.int64)
-    for first in range(0, len(codes), _CHUNK):
-        piece = slice(first, first + _CHUNK)
+    for first in range(0, len(codes), CHUNK):
+        piece = slice(first, first + CHUNK)
         units[piece] = _search_chunk(codes[piece], codebook, None if without is None else without[piece])
     return units
 
 
-def _search_chunk(
-    codes: NDArray[np.float32], codebook: NDArray[np.float32], without: NDArray[np.int64] | None
-) -> NDArray[np.int64]:
+def _search_chunk(codes: Rows, codebook: Rows, without: NDArray[np.int64] | None) -> NDArray[np.int64]:
     """float32 products find the candidates; float64 decides where they are nearer to each other than rounding."""
     norms = np.square(codebook, dtype=np.float64).sum(axis=1)
     scores: NDArray[np.float32] = codes @ codebook.T
@@ -163,20 +235,18 @@ def _search_chunk(
     # In pieces: where all units lie close together every unit is a candidate of every row.
     for rows in np.array_split(doubtful, len(doubtful) // 128 + 1):
         which, unit = np.nonzero(scores[rows] >= (best[rows] - bound[rows])[:, None])
-        distance = _distances(codes[rows[which]], codebook, unit)
+        distance = distances(codes[rows[which]], codebook, unit)
         order = np.lexsort((unit, distance, which))
         leaders = order[np.unique(which[order], return_index=True)[1]]
         units[rows[which[leaders]]] = unit[leaders]
     return units
 
 
-def _distances(
-    codes: NDArray[np.float32], codebook: NDArray[np.float32], units: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def distances(codes: Rows, codebook: Rows, units: NDArray[np.int64]) -> NDArray[np.float64]:
     """Euclidean distance of every row to its unit, float64 (n,)."""
     distances = np.empty(len(codes))
-    for first in range(0, len(codes), _CHUNK):
-        piece = slice(first, first + _CHUNK)
+    for first in range(0, len(codes), CHUNK):
+        piece = slice(first, first + CHUNK)
         difference = codes[piece].astype(np.float64) - codebook[units[piece]]
         distances[piece] = np.sqrt(np.square(difference).sum(axis=1))
     return distances

@@ -7,7 +7,9 @@ from pathlib import Path
 from placerec.files import whole_file
 from placerec.frames import find_sequences
 from placerec.vision.describe import Progress, describe, save_descriptors
-from placerec.vision.dictionary import Dictionary
+from placerec.vision.dictionary import Dictionary, Quality
+from placerec.vision.quality import MapQuality
+from placerec.vision.som import WIDTH
 from placerec.vision.spec import DescriptorSpec
 
 log = logging.getLogger(__name__)
@@ -42,14 +44,21 @@ def train_dictionary(
     fraction: float = 1.0,
     epochs: int | None = None,
     units: str = "live",
+    rule: str = "batch",
+    width: float = WIDTH,
+    held_out: Iterable[Path | str] = (),
     progress: Progress | None = None,
 ) -> Dictionary:
     """Describe the frames of the sources, fit a dictionary to them (`Dictionary.fit`) and write it to `out`.
 
+    `held_out`: sources that train nothing; how well the map represents them (`Dictionary.measure`) is noted.
     `progress` is called with frames described and in all. Raises as `describe_sources` and `Dictionary.fit` do.
     """
     with whole_file(Path(out)) as partial:
-        described = describe(find_sequences(sources, format=format), spec, progress=progress)
+        training, others = find_sequences(sources, format=format), find_sequences(held_out, format=format)
+        seen, unseen = (sum(len(sequence.frames) for sequence in some) for some in (training, others))
+        tell = progress or (lambda done, total: None)
+        described = describe(training, spec, progress=lambda done, _: tell(done, seen + unseen))
         dictionary = Dictionary.fit(
             described.values,
             spec=described.spec,
@@ -59,9 +68,14 @@ def train_dictionary(
             fraction=fraction,
             epochs=epochs,
             units=units,
+            rule=rule,
+            width=width,
         )
         dictionary.save(partial)
-    _report(dictionary)
+        _report(dictionary)
+        if others:
+            more = describe(others, described.spec, progress=lambda done, _: tell(seen + done, seen + unseen))
+            _report_held_out(dictionary.measure(more))
     return dictionary
 
 
@@ -69,7 +83,7 @@ def _report(dictionary: Dictionary) -> None:
     quality = dictionary.quality
     log.info(
         "%d words, %d of them never seen, from %d of %d frames; %d components keep %.1f %% of the variance (%d would "
-        "keep 99 %%); quantisation error %.4g, topographic error %.3f after %d epochs",
+        "keep 99 %%); after %d epochs %s",
         len(dictionary.hits),
         dictionary.dead,
         quality.used,
@@ -77,7 +91,22 @@ def _report(dictionary: Dictionary) -> None:
         len(dictionary.pca.components),
         100 * quality.explained,
         quality.needed,
-        quality.quantisation_error,
-        quality.topographic_error,
         quality.epochs,
+        _errors(quality),
+    )
+
+
+def _report_held_out(quality: MapQuality) -> None:
+    log.info(
+        "held out: %d frames, %.1f %% of them on words that training never saw; %s",
+        quality.frames,
+        100 * quality.unseen,
+        _errors(quality),
+    )
+
+
+def _errors(quality: Quality | MapQuality) -> str:
+    return (
+        f"quantisation error {quality.quantisation_error:.4g}, topographic error {quality.topographic_error:.3f}, "
+        f"entropy {quality.entropy:.2f} bits"
     )

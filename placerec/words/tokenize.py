@@ -53,7 +53,7 @@ def streams_of(
 
 def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStream]:
     """The token streams of described frames, one per sequence."""
-    units, distances = dictionary.words(descriptors.values)
+    units, distances = dictionary.words(descriptors)
     vocabulary = dictionary.vocabulary
     streams = []
     for name, rows in descriptors.rows_by_sequence().items():

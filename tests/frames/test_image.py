@@ -104,6 +104,48 @@ def test_gray_with_alpha(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_gray(write(tmp_path / "a.png", data)), np.full((10, 9), 200))
 
 
+def png(depth: int, kind: int, rows: list[bytes], *between: bytes) -> bytes:
+    """A PNG 8 pixels wide."""
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", 8, len(rows), depth, kind, 0, 0, 0))
+    data = chunk(b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows)))
+    return b"\x89PNG\r\n\x1a\n" + header + b"".join(between) + data + chunk(b"IEND", b"")
+
+
+def test_palette(tmp_path: Path) -> None:
+    colours = bytes([0, 0, 0, 255, 0, 0, 0, 0, 255])
+    image = read_gray(
+        write(tmp_path / "a.png", png(8, 3, [bytes([0, 1, 2, 0, 1, 2, 0, 1])] * 9, chunk(b"PLTE", colours)))
+    )
+    assert np.abs(image.astype(int) - [0, 76, 29, 0, 76, 29, 0, 76]).max() <= 1
+
+
+def test_one_bit(tmp_path: Path) -> None:
+    image = read_gray(write(tmp_path / "a.png", png(1, 0, [b"\xa1"] * 8)))
+    np.testing.assert_array_equal(image, [[255, 0, 255, 0, 0, 0, 0, 255]] * 8)
+
+
+def test_the_first_picture_of_a_gif(tmp_path: Path) -> None:
+    if not cv2.haveImageWriter("a.gif"):
+        pytest.skip("this OpenCV writes no GIF")
+    pixels = np.zeros((9, 8, 3), np.uint8)
+    pixels[:4] = 255
+    image = read_gray(write(tmp_path / "a.gif", encode(".gif", pixels)))
+    assert np.abs(image.astype(int) - pixels[..., 0]).max() < 60  # its writer dithers
+
+
+def test_cmyk_jpeg(tmp_path: Path) -> None:
+    # 16 x 8 pixels, the left half (200, 40, 90) in RGB, the right (20, 180, 220).
+    data = bytes.fromhex(
+        "ffd8ffee000e41646f626500640000000000ffdb0043000302020302020303030304030304050805050404050a070706080c0a0c0c0b0a"
+        "0b0b0d0e12100d0e110e0b0b1016101113141515150c0f171816141812141514ffc000140800080010044311004d11005911004b1100ff"
+        "c40017000101010100000000000000000000000009080007ffc40014100100000000000000000000000000000000ffda000e0443004d00"
+        "59004b00003f00b010a38d15303e5d8ad33fffd9"
+    )
+    image = read_gray(write(tmp_path / "a.jpeg", data)).astype(int)
+    assert np.abs(image[:, :8] - 94).max() <= 2
+    assert np.abs(image[:, 8:] - 137).max() <= 2
+
+
 @pytest.mark.parametrize("suffix", [".png", ".tif", ".pgm"])
 @pytest.mark.parametrize("bits", [8, 10, 12, 14, 16])
 def test_sixteen_bits_of_any_depth(tmp_path: Path, suffix: str, bits: int) -> None:

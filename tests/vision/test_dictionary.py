@@ -2,6 +2,9 @@
 
 import json
 import logging
+import os
+import subprocess
+import sys
 import zipfile
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -13,7 +16,8 @@ import pytest
 from numpy.typing import NDArray
 
 from placerec.errors import OutputError, VisionError
-from placerec.vision import DescriptorSpec, Dictionary, descriptor
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, descriptor
+from placerec.vision.chunks import CHUNK, Source
 from placerec.vision.dictionary import Quality
 
 SPEC = DescriptorSpec()
@@ -26,7 +30,7 @@ def sample(n: int = 300, seed: int = 0) -> NDArray[np.float32]:
     return (places[rng.integers(20, size=n)] + 0.01 * rng.random((n, 384))).astype(np.float32)
 
 
-def fit(descriptors: NDArray[np.float32] | None = None, **options: Any) -> Dictionary:
+def fit(descriptors: Source | None = None, **options: Any) -> Dictionary:
     chosen: Content = {"spec": SPEC, "size": 5} | options
     return Dictionary.fit(sample() if descriptors is None else descriptors, **chosen)
 
@@ -103,6 +107,81 @@ def test_fraction_draws_frames_by_the_seed() -> None:
     assert (some.pca.mean != other.pca.mean).any()
 
 
+def test_streamed_and_mapped_descriptors_give_the_same(tmp_path: Path) -> None:
+    rows = sample(CHUNK + 50)
+    np.save(tmp_path / "rows.npy", rows)
+    mapped = np.load(tmp_path / "rows.npy", mmap_mode="r")
+    options: Content = {"size": 3, "components": 4, "epochs": 2}
+    assert fit(mapped, **options).fingerprint == fit(rows, **options).fingerprint
+    options["fraction"] = 0.6
+    whole = fit(rows, **options)
+    assert fit(lambda: iter(np.split(rows, [10, 10, 3500])), **options).fingerprint == whole.fingerprint
+
+
+def test_streamed_descriptors_are_checked() -> None:
+    rows = sample(20)
+    rows[13, 2] = np.nan
+    with pytest.raises(VisionError, match=r"descriptor 13 \(from 0\) holds NaN or infinite values; leave it out"):
+        fit(lambda: iter(np.split(rows, [6, 12])))
+    with pytest.raises(VisionError, match="the descriptors have 10 values, and the dictionary's have 384"):
+        fit(lambda: iter([rows[:, :10]]))
+
+
+BLAS = """
+import numpy as np
+from placerec.vision import DescriptorSpec, Dictionary
+from placerec.vision.som import train_som
+rng = np.random.default_rng(0)
+rows = (rng.random((30, 384))[rng.integers(30, size=1500)] + 0.3 * rng.random((1500, 384))).astype(np.float32)
+made = Dictionary.fit(rows, spec=DescriptorSpec(), size=12, components=40, epochs=6)
+print(made.fingerprint, made.words(rows[:100] + np.float32(0.01))[1].tobytes().hex())
+online = train_som(rows[:300, :40], 12, rng=rng, rule="online", epochs=1)
+print(online.codebook.tobytes().hex())
+"""
+
+
+def test_the_bytes_do_not_depend_on_the_blas_and_its_threads() -> None:
+    outputs = set()
+    # Kernels of another processor add in another order, as more threads do; a BLAS that is not OpenBLAS ignores them.
+    for threads, kernels in (("1", {}), ("2", {}), ("2", {"OPENBLAS_CORETYPE": "Haswell"})):
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads} | kernels
+        run = subprocess.run([sys.executable, "-c", BLAS], env=environment, capture_output=True, text=True, check=True)
+        outputs.add(run.stdout)
+    assert len(outputs) == 1
+    assert len(outputs.pop().splitlines()) == 2
+
+
+def test_descriptors_of_another_kind_are_refused(dictionary: Dictionary) -> None:
+    rows = sample(3)
+    names = ("a", "b", "c")
+    mine = Descriptors(SPEC, rows, names, names, np.zeros(3), names, 0, 0)
+    np.testing.assert_array_equal(dictionary.words(mine)[0], dictionary.words(rows)[0])
+    assert dictionary.measure(mine) == dictionary.measure(rows)
+    other = replace(mine, spec=DescriptorSpec("classic"))
+    for work in (dictionary.words, dictionary.measure):
+        with pytest.raises(VisionError, match=r"the descriptors are of another kind .*'classic'.* the dictionary's"):
+            work(other)
+
+
+def test_quality_is_measured_on_training_and_on_other_frames(dictionary: Dictionary) -> None:
+    trained, quality = dictionary.measure(sample()), dictionary.quality
+    assert (trained.frames, trained.unseen, trained.dead) == (300, 0, dictionary.dead)
+    assert (trained.quantisation_error, trained.topographic_error, trained.entropy, trained.dead) == (
+        quality.quantisation_error,
+        quality.topographic_error,
+        quality.entropy,
+        quality.dead,
+    )
+    shares = dictionary.hits[dictionary.hits > 0] / 300
+    assert quality.entropy == pytest.approx(-(shares * np.log2(shares)).sum())
+    elsewhere = np.random.default_rng(5).random((400, 384)).astype(np.float32) * 0.2
+    others = dictionary.measure(elsewhere)
+    assert others.quantisation_error != trained.quantisation_error
+    # The nearest of all units, dead ones among them, though `words` answers with live ones.
+    units, _ = replace(dictionary, training=replace(dictionary.training, units="all")).words(elsewhere)
+    assert others.unseen == pytest.approx((dictionary.hits[units] == 0).mean())
+
+
 def test_what_the_data_cannot_give_is_said(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         few = fit(sample(10))
@@ -127,6 +206,9 @@ def test_what_the_data_cannot_give_is_said(caplog: pytest.LogCaptureFixture) -> 
         (sample(), {"fraction": 0.0}, "fraction 0.0 cannot be used; give a number above 0 and up to 1"),
         (sample(), {"fraction": 1.5}, "fraction 1.5 cannot be used; give a number above 0 and up to 1"),
         (sample(), {"units": "some"}, "no choice of units is called 'some'; choose one of live, all"),
+        (sample(), {"rule": "kohonen"}, "no rule is called 'kohonen'; choose one of batch, online"),
+        (sample(), {"width": 0.0}, "width 0.0 cannot be used; give a number above 0"),
+        (sample(), {"width": np.inf}, "width inf cannot be used; give a number above 0"),
     ],
 )
 def test_unusable_input_is_refused(descriptors: NDArray[np.float32], options: Content, message: str) -> None:
@@ -158,7 +240,7 @@ def test_a_descriptor_that_does_not_exist_is_refused(options: Content, message: 
 
 def test_load_gives_what_was_saved(tmp_path: Path) -> None:
     spec = DescriptorSpec("classic", 64, "crop")
-    saved = fit(spec=spec, size=4, components=7, seed=3, fraction=0.5, epochs=9, units="all")
+    saved = fit(spec=spec, size=4, components=7, seed=3, fraction=0.5, epochs=9, units="all", width=0.3)
     # Whatever the suffix: the name is the user's.
     saved.save(tmp_path / "words.bin")
     loaded = Dictionary.load(tmp_path / "words.bin")
@@ -183,7 +265,17 @@ def test_the_file_is_arrays_and_json(tmp_path: Path, dictionary: Dictionary) -> 
         meta = json.loads(str(file["meta"]))
     assert (meta["format"], meta["version"]) == ("placerec-words", 1)
     assert meta["descriptor"] == {"variant": "lmgist", "image_size": 128, "fit": "squash"}
-    assert meta["training"]["size"] == 5
+    assert meta["training"] == {
+        "size": 5,
+        "components": 80,
+        "seed": 0,
+        "fraction": 1.0,
+        "epochs": None,
+        "units": "live",
+        "rule": "batch",
+        "width": 0.5,
+    }
+    assert set(meta["quality"]) >= {"explained", "needed", "quantisation_error", "topographic_error", "entropy", "dead"}
 
 
 def content_of(dictionary: Dictionary, path: Path) -> Content:

@@ -1,7 +1,10 @@
 """GIST against the originals' numbers, against a plain float64 program, and at the edges."""
 
 import json
+import os
+import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +132,37 @@ def test_other_filters_and_blocks_agree_with_the_plain_program() -> None:
     image = textured(45, 62)
     got = gist(image, orientations=(5, 3), blocks=7)
     assert deviation(got, plain_gist(image, "lmgist", (5, 3), 7)) <= 2e-5
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("shape", [(64, 64), (128, 128), (75, 50), (33, 41)])
+def test_the_engine_without_ipp_agrees(variant: str, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    image = textured(*shape)
+    usual = gist(image, variant)
+    for ipp in (True, False):
+        monkeypatch.setattr(sys.modules["placerec.vision.gist"], "_has_ipp", lambda ipp=ipp: ipp)
+        assert deviation(gist(image, variant), usual) <= 2e-6
+        assert deviation(gist(image, variant), plain_gist(image, variant)) <= 1e-5
+
+
+def test_opencv_without_ipp_is_not_used() -> None:
+    # OPENCV_IPP is OpenCV's own switch; what is left then is what a wheel for ARM has.
+    code = "import sys; from placerec.vision import gist; print(sys.modules['placerec.vision.gist']._has_ipp())"
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"OPENCV_IPP": "disabled"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout == "False\n"
+
+
+def test_two_threads_give_the_same_bytes() -> None:
+    images = [textured(40, 40, seed) for seed in range(40)]
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(gist, images))
+    np.testing.assert_array_equal(together, [gist(image) for image in images])
 
 
 def test_a_bank_too_large_to_keep_gives_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,11 +1,90 @@
-"""Fitting images to the square."""
+"""Fitting images to the square, and what becomes of the files that cameras and disks spoil."""
+
+import logging
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from placerec.errors import VisionError
-from placerec.vision import fit_image
+from placerec.frames import Frame, Sequence
+from placerec.vision import DescriptorSpec, describe, fit_image
+
+TEXTURE = np.random.default_rng(0).integers(0, 256, (30, 40), np.uint8)
+TWELVE = np.random.default_rng(0).integers(0, 4096, (30, 40), np.uint16)
+
+
+def encode(suffix: str, pixels: NDArray[Any]) -> bytes:
+    ok, data = cv2.imencode(suffix, pixels)
+    assert ok
+    return data.tobytes()
+
+
+CONSTANT = encode(".png", np.full((30, 40), 90, np.uint8))
+USABLE = {
+    "grey.png": encode(".png", TEXTURE),
+    "colour.jpg": encode(".jpg", np.dstack([TEXTURE] * 3)),
+    "alpha.png": encode(".png", np.dstack([TEXTURE] * 4)),
+    "sixteen.png": encode(".png", TEXTURE.astype(np.uint16) * np.uint16(257)),
+    "twelve.png": encode(".png", TWELVE),
+    "twelve.tif": encode(".tif", TWELVE),
+    "eight-sixteen.png": encode(".png", TEXTURE.astype(np.uint16)),
+    "webp.webp": encode(".webp", TEXTURE),
+    "smallest.png": encode(".png", TEXTURE[:8, :8]),
+    "narrow.png": encode(".png", TEXTURE[:, :8]),
+}
+UNUSABLE = {
+    "no-end.jpg": (encode(".jpg", TEXTURE)[:-2], "JPEG is truncated or damaged (no end marker)"),
+    "half.jpg": (encode(".jpg", TEXTURE)[:400], "JPEG is truncated or damaged (no end marker)"),
+    "head.jpg": (encode(".jpg", TEXTURE)[:20], "JPEG is truncated or damaged (no end marker)"),
+    "half.png": (encode(".png", TEXTURE)[:400], "PNG is truncated (no IEND)"),
+    "half.webp": (encode(".webp", TEXTURE)[:200], "is no image that OpenCV can decode"),
+    "half.tif": (encode(".tif", TEXTURE)[:600], "is no image that OpenCV can decode"),
+    "empty.png": (b"", "is empty"),
+    "text.jpg": (b"no picture", "is no image that OpenCV can decode"),
+    "tiny.png": (encode(".png", TEXTURE[:1, :1]), "is 1x1 pixels, and 8 a side are needed"),
+    "flat.png": (encode(".png", TEXTURE[:7]), "is 40x7 pixels, and 8 a side are needed"),
+    "float.tif": (encode(".tif", TEXTURE / np.float32(255)), "has pixels of type float32"),
+    "nan.tif": (encode(".tif", np.full((30, 40), np.nan, np.float32)), "has pixels of type float32"),
+}
+
+
+def written(folder: Path, files: dict[str, bytes]) -> list[Sequence]:
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    frames = tuple(Frame(name, float("nan"), "", folder / name) for name in files)
+    return [Sequence("run", frames, folder)]
+
+
+@pytest.mark.parametrize("variant", ["lmgist", "classic"])
+def test_what_can_be_read_is_described(tmp_path: Path, variant: str, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        described = describe(written(tmp_path, USABLE), DescriptorSpec(variant, 32))
+    assert caplog.messages == []
+    assert described.frames == tuple(USABLE)
+    assert np.isfinite(described.values).all()
+    assert (described.values.max(axis=1) > 0.01).all()
+    same = described.values[[described.frames.index(name) for name in ("grey.png", "alpha.png", "sixteen.png")]]
+    # Eight bits are rounded after the resizing.
+    np.testing.assert_allclose(same, same[[0, 0, 0]], rtol=0, atol=3e-3)
+    np.testing.assert_array_equal(*described.values[[4, 5]])
+
+
+def test_what_cannot_be_read_is_named_and_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    files = {name: data for name, (data, _) in UNUSABLE.items()} | {"constant.png": CONSTANT}
+    with caplog.at_level(logging.INFO):
+        described = describe(written(tmp_path, files), DescriptorSpec(image_size=32))
+    assert (described.frames, described.skipped, described.constant) == (("constant.png",), len(UNUSABLE), 1)
+    np.testing.assert_array_equal(described.values, np.zeros((1, 384), np.float32))
+    *told, constant, summary = caplog.messages
+    for (name, (_, reason)), message in zip(UNUSABLE.items(), told, strict=True):
+        assert message.startswith(f"{tmp_path / name}: {reason}; ")
+        assert message.endswith("; the frame is skipped")
+    assert constant == f"{tmp_path / 'constant.png'}: of one grey level throughout; its descriptor is zero"
+    assert summary == f"1 frames described, {len(UNUSABLE)} skipped, 1 of one grey level throughout"
 
 
 @pytest.mark.parametrize("fit", ["squash", "crop"])

@@ -1,6 +1,7 @@
 """PCA in one pass against numpy's SVD, and products whose bits do not depend on the order of additions."""
 
 import logging
+from functools import partial
 
 import numpy as np
 import pytest
@@ -49,6 +50,18 @@ def test_moments_do_not_depend_on_where_the_stream_is_cut() -> None:
     centred = x - x.astype(float).mean(axis=0)
     np.testing.assert_allclose(pieces.scatter, centred.T @ centred, rtol=1e-9, atol=1e-9)
     assert moments(sample(exact.TERMS + 5, 4)).n == exact.TERMS + 5
+
+
+def test_a_stream_gives_the_moments_of_the_array() -> None:
+    x = sample(exact.TERMS + 300, 5)
+    whole = moments(x)
+    cuts: list[list[int]] = [[], [7], [5, 4000, 4000, 4200]]
+    for places in cuts:
+        streamed = moments(partial(lambda places: iter(np.split(x, places)), places))
+        assert streamed.n == whole.n
+        np.testing.assert_array_equal(streamed.mean, whole.mean)
+        np.testing.assert_array_equal(streamed.scatter, whole.scatter)
+    assert moments(lambda: iter([])).n == 0
 
 
 def test_few_rows_give_few_components(caplog: pytest.LogCaptureFixture) -> None:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from small import write_images
 
-from placerec.errors import OutputError
+from placerec.errors import OutputError, VisionError
 from placerec.frames import find_sequences
 from placerec.vision import DescriptorSpec, Dictionary, describe
 from placerec.words import read_stream, read_vocabulary
-from placerec.words.tokenize import streams_of, tokenize
+from placerec.words.tokenize import streams_of, tokenize, tokens_of
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +50,13 @@ def test_words_are_those_of_the_dictionary(world: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(stream.distances, distances, rtol=1e-5)
     fingerprint = json.loads((tmp_path / "tokens/tokens.json").read_text())["dictionary"]
     assert fingerprint == dictionary.fingerprint
+
+
+def test_descriptors_of_another_kind_have_no_words(world: Path) -> None:
+    dictionary = Dictionary.load(world / "words.npz")
+    described = describe(find_sequences([world / "runs/seq2"]), DescriptorSpec(image_size=24))
+    with pytest.raises(VisionError, match="the descriptors are of another kind"):
+        tokens_of(described, dictionary)
 
 
 def test_a_frame_has_one_word_whatever_is_tokenized_with_it(world: Path, tmp_path: Path) -> None:
