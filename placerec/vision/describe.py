@@ -1,7 +1,10 @@
 """Sequences -> descriptors: every frame is read, described and forgotten."""
 
 import logging
-from collections.abc import Callable, Iterable
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -46,17 +49,22 @@ class Descriptors:
 
 
 def describe(
-    sequences: Iterable[Sequence], spec: DescriptorSpec | None = None, *, progress: Progress | None = None
+    sequences: Iterable[Sequence],
+    spec: DescriptorSpec | None = None,
+    *,
+    workers: int | None = None,
+    progress: Progress | None = None,
 ) -> Descriptors:
     """The descriptor of every frame; an image that cannot be read is skipped, counted and named in a warning.
 
-    Raises VisionError if no image can be read. `spec`: None is the default one.
+    `spec`: None is the default one. `workers`: threads that read and describe, None for one a processor; the result
+    is the same for any number. Raises VisionError if no image can be read.
     """
     spec = spec or DescriptorSpec()
     named = [(sequence.name, frame) for sequence in sequences for frame in sequence.frames]
     results = []
-    for done, (_, frame) in enumerate(named, start=1):
-        results.append(describe_image(frame.path, spec))
+    for done, result in enumerate(_described([frame.path for _, frame in named], spec, workers), start=1):
+        results.append(result)
         if progress is not None:
             progress(done, len(named))
     kept = []
@@ -82,6 +90,25 @@ def describe(
         len(named) - len(kept),
         len(constant),
     )
+
+
+def _described(paths: Iterable[Path], spec: DescriptorSpec, workers: int | None) -> Iterator[Floats | str]:
+    """`describe_image` of every path, in order; no more images are in memory than the workers can use."""
+    workers = _processors() if workers is None else workers
+    waiting: deque[Future[Floats | str]] = deque()
+    # Threads are enough: decoding, the transforms and numpy's loops all run without the interpreter's lock.
+    with ThreadPoolExecutor(workers) as pool:
+        for path in paths:
+            waiting.append(pool.submit(describe_image, path, spec))
+            if len(waiting) > 4 * workers:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+
+def _processors() -> int:
+    # Of those that this process may run on, where the system can tell.
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def describe_image(path: Path, spec: DescriptorSpec) -> Floats | str:

@@ -72,6 +72,30 @@ def test_broken_images_are_skipped_and_constant_ones_counted(tmp_path: Path, cap
     assert warnings[2] == f"{one.frames[3].path}: of one grey level throughout; its descriptor is zero"
 
 
+def test_any_number_of_workers_gives_the_same(tmp_path: Path) -> None:
+    one = sequence(tmp_path, "run", 30)
+    one.frames[5].path.write_bytes(b"not an image")
+    spec = DescriptorSpec(image_size=64)
+    described = [describe([one], spec, workers=workers) for workers in (1, 2, 5)]
+    for other in described[1:]:
+        assert other.values.tobytes() == described[0].values.tobytes()
+        assert other.frames == described[0].frames
+
+
+def test_images_are_not_read_ahead_of_the_workers(tmp_path: Path) -> None:
+    one = sequence(tmp_path, "run", 40)
+    seen: list[int] = []
+
+    def stop(done: int, total: int) -> None:
+        seen.append(done)
+        # Within the window of two workers nothing past this frame has been opened yet.
+        one.frames[-1].path.unlink(missing_ok=True)
+
+    described = describe([one], DescriptorSpec(image_size=32), workers=2, progress=stop)
+    assert seen == list(range(1, 41))
+    assert described.skipped == 1
+
+
 def test_nothing_readable_is_an_error(tmp_path: Path) -> None:
     one = sequence(tmp_path, "run", 2)
     for frame in one.frames:
