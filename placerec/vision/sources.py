@@ -18,16 +18,20 @@ def describe_sources(
     out: Path | str,
     *,
     spec: DescriptorSpec | None = None,
+    matrix: Path | str | None = None,
     format: str = "auto",
     progress: Progress | None = None,
 ) -> None:
     """Write the descriptors of all frames of the sources to `out`; `progress` is called with frames done and in all.
 
-    Raises SourceError for sources and VisionError for images that cannot be used, OutputError for the file.
+    `spec`, `matrix`: as for `describe`. Raises SourceError for sources and VisionError for images or a matrix that
+    cannot be used, OutputError for the file.
     """
     # The file comes first: that it cannot be written must not be found out after an hour of images.
     with whole_file(Path(out)) as partial:
-        save_descriptors(describe(find_sequences(sources, format=format), spec, progress=progress), partial)
+        save_descriptors(
+            describe(find_sequences(sources, format=format), spec, matrix=matrix, progress=progress), partial
+        )
 
 
 def train_dictionary(
@@ -35,6 +39,7 @@ def train_dictionary(
     out: Path | str,
     *,
     spec: DescriptorSpec | None = None,
+    matrix: Path | str | None = None,
     format: str = "auto",
     size: int = 10,
     components: int = 80,
@@ -46,10 +51,11 @@ def train_dictionary(
 ) -> Dictionary:
     """Describe the frames of the sources, fit a dictionary to them (`Dictionary.fit`) and write it to `out`.
 
-    `progress` is called with frames described and in all. Raises as `describe_sources` and `Dictionary.fit` do.
+    `spec`, `matrix`: as for `describe`. `progress` is called with frames described and in all. Raises as
+    `describe_sources` and `Dictionary.fit` do.
     """
     with whole_file(Path(out)) as partial:
-        described = describe(find_sequences(sources, format=format), spec, progress=progress)
+        described = describe(find_sequences(sources, format=format), spec, matrix=matrix, progress=progress)
         dictionary = Dictionary.fit(
             described.values,
             spec=described.spec,
