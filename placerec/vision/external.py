@@ -53,15 +53,15 @@ def read_rows(path: Path, frames: Sequence[Name]) -> tuple[NDArray[np.float32], 
 
 
 def _load(path: Path) -> tuple[NDArray[Any], list[Name] | None]:
-    with reading():
-        with path.open("rb") as file:
-            if not file.read(6).startswith((b"\x93NUMPY", b"PK")):
-                raise VisionError("it is not a .npy or .npz file")
-        # A .npy stays on disk, and nothing in either file is executed.
-        loaded = np.load(path, mmap_mode="r", allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return loaded, None
-        with loaded as archive:
+    with reading(), path.open("rb") as file:
+        start = file.read(6)
+        if start == b"\x93NUMPY":
+            return np.load(path, mmap_mode="r", allow_pickle=False), None
+        if not start.startswith(b"PK"):
+            raise VisionError("it is not a .npy or .npz file")
+        file.seek(0)
+        # Nothing in the file is executed. It is opened here because numpy leaves what it cannot read open.
+        with np.load(file, allow_pickle=False) as archive:
             if "descriptors" not in archive.files:
                 raise VisionError("the array descriptors is missing")
             matrix = archive["descriptors"]
