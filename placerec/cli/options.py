@@ -125,8 +125,10 @@ def descriptor_option(text: str, *kinds: str) -> Callable[[Command], Command]:
     """--descriptor: one of `kinds`, the first by default, or npy:FILE; as the kind and the file, if there is one."""
 
     def parse(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[str, Path | None] | None:
-        if value is None or value in kinds:
-            return None if value is None else (value, None)
+        if value is None:
+            return None
+        if value in kinds:
+            return value, None
         kind, _, path = value.partition(":")
         if kind != "npy" or not path:
             raise click.BadParameter(f"{value!r} is not one of {', '.join((*kinds, 'npy:FILE'))}", ctx, param)
