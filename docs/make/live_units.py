@@ -33,7 +33,7 @@ def row(folder: Path, test: list[str]) -> str:
     on_dead_share = on_dead / len(SEEDS) / sum(int(mask.sum()) for mask in tests)
     return (
         f"| {folder.name} | {asked} | {share:.3f} | {spread(every)} | {spread(live)} "
-        f"| {np.mean(live) - np.mean(every):+.3f} | {np.mean(dead):.0f} of {SIZE**2} | {on_dead_share:.1%} |\n"
+        f"| {np.mean(live) - np.mean(every):+.3f} | {np.mean(dead):.0f} of {SIZE**2} | {100 * on_dead_share:.1f} % |\n"
     )
 
 

@@ -71,13 +71,10 @@ def describe(
     else:
         spec = spec or DescriptorSpec()
         check_describes_images(spec)
-        values, kept = _made(named, spec, workers, progress)
-        zero = np.flatnonzero(~values.any(axis=1))
-        constant = len(zero)
-        if constant:
-            log.warning("%s: of one grey level throughout; its descriptor is zero", named[kept[zero[0]]][1].path)
+        values, kept, constant = _made(named, spec, workers, progress)
     skipped = len(named) - len(kept)
-    log.info("%d frames described, %d skipped, %d of one grey level throughout", len(kept), skipped, constant)
+    pictures = f", {constant} of one grey level throughout" if matrix is None else f"; rows of {matrix}"
+    log.info("%d frames described, %d skipped%s", len(kept), skipped, pictures)
     found = [named[k] for k in kept]
     return Descriptors(
         spec,
@@ -109,8 +106,8 @@ def _given(
 
 def _made(
     named: list[tuple[str, Frame]], spec: DescriptorSpec, workers: int | None, progress: Progress | None
-) -> tuple[Floats, list[int]]:
-    """The descriptors of images, and the indices of the frames that could be described."""
+) -> tuple[Floats, list[int], int]:
+    """The descriptors of images, the indices of the frames that they are of, and how many images are constant."""
     results = []
     for done, result in enumerate(_described([frame.path for _, frame in named], spec, workers), start=1):
         results.append(result)
@@ -125,7 +122,10 @@ def _made(
             kept.append(k)
     if not kept:
         raise VisionError(f"none of the {len(named)} images can be read; name a folder with images")
-    return np.stack(rows), kept
+    constant = [k for k, row in zip(kept, rows, strict=True) if not row.any()]
+    if constant:
+        log.warning("%s: of one grey level throughout; its descriptor is zero", named[constant[0]][1].path)
+    return np.stack(rows), kept, len(constant)
 
 
 def _described(paths: Iterable[Path], spec: DescriptorSpec, workers: int | None) -> Iterator[Floats | str]:
