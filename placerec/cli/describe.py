@@ -1,10 +1,14 @@
 """`placerec describe`."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from placerec.cli.options import descriptor_options, output_option, progress_bar, source_arguments, talk_options
+
+if TYPE_CHECKING:
+    from placerec.vision import DescriptorSpec
 
 
 @click.command(epilog="Example: placerec describe COLD/seq1_cloudy1 -o descriptors.npz")
@@ -12,13 +16,15 @@ from placerec.cli.options import descriptor_options, output_option, progress_bar
 @descriptor_options
 @output_option("descriptors.npz", "The file to write: arrays descriptors, frames, sequences, places, times.")
 @talk_options
-def describe(sources: tuple[Path, ...], format_: str, variant: str, image_size: int, fit: str, out: Path) -> None:
-    """Write the GIST descriptor of every frame.
+def describe(
+    sources: tuple[Path, ...], format_: str, spec: "DescriptorSpec | None", matrix: Path | None, out: Path
+) -> None:
+    """Write the descriptor of every frame.
 
     SOURCE is a sequence (a folder of images, with or without std_cam/ and localization/places.lst as in COLD), a
     folder of sequences, or a folder with one folder of images per place.
     """
-    from placerec.vision import DescriptorSpec, describe_sources
+    from placerec.vision import describe_sources
 
     with progress_bar("describe") as progress:
-        describe_sources(sources, out, spec=DescriptorSpec(variant, image_size, fit), format=format_, progress=progress)
+        describe_sources(sources, out, spec=spec, matrix=matrix, format=format_, progress=progress)

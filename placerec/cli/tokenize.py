@@ -4,15 +4,25 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import output_option, progress_bar, source_arguments, talk_options, words_option
+from placerec.cli.options import (
+    descriptor_option,
+    output_option,
+    progress_bar,
+    source_arguments,
+    talk_options,
+    words_option,
+)
 
 
 @click.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")
 @source_arguments
 @words_option(True, "The dictionary of train-words.")
+@descriptor_option("The frames' descriptors, if those of the dictionary were computed elsewhere.")
 @output_option("tokens/", "The folder to write: one .tsv per sequence, and vocab.txt.")
 @talk_options
-def tokenize(sources: tuple[Path, ...], format_: str, words: Path, out: Path) -> None:
+def tokenize(
+    sources: tuple[Path, ...], format_: str, words: Path, descriptor: tuple[str, Path] | None, out: Path
+) -> None:
     """Write the visual word of every frame.
 
     SOURCE is a sequence (a folder of images, with or without std_cam/ and localization/places.lst as in COLD), a
@@ -21,4 +31,4 @@ def tokenize(sources: tuple[Path, ...], format_: str, words: Path, out: Path) ->
     from placerec.words.tokenize import tokenize as run
 
     with progress_bar("tokenize") as progress:
-        run(sources, words, out, format=format_, progress=progress)
+        run(sources, words, out, matrix=descriptor and descriptor[1], format=format_, progress=progress)

@@ -1,6 +1,7 @@
 """`placerec train-words`."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,6 +14,9 @@ from placerec.cli.options import (
     source_arguments,
     talk_options,
 )
+
+if TYPE_CHECKING:
+    from placerec.vision import DescriptorSpec
 
 
 @click.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
@@ -84,9 +88,8 @@ def train_words(
     rule: str,
     width: float,
     held_out: tuple[Path, ...],
-    variant: str,
-    image_size: int,
-    fit: str,
+    spec: "DescriptorSpec | None",
+    matrix: Path | None,
     out: Path,
 ) -> None:
     """Learn visual words: PCA and a map of descriptors.
@@ -94,13 +97,14 @@ def train_words(
     SOURCE is a sequence (a folder of images, with or without std_cam/ and localization/places.lst as in COLD), a
     folder of sequences, or a folder with one folder of images per place.
     """
-    from placerec.vision import DescriptorSpec, train_dictionary
+    from placerec.vision import train_dictionary
 
     with progress_bar("describe") as progress:
         train_dictionary(
             sources,
             out,
-            spec=DescriptorSpec(variant, image_size, fit),
+            spec=spec,
+            matrix=matrix,
             format=format_,
             size=size,
             components=components,

@@ -1,16 +1,19 @@
-"""From image to word: the GIST descriptor, its principal components and the self-organising map."""
+"""From image to word: descriptors, their principal components and the self-organising map."""
 
+from placerec.vision.centrist import centrist
 from placerec.vision.describe import Descriptors, describe, save_descriptors
 from placerec.vision.dictionary import Dictionary
 from placerec.vision.gist import gist
 from placerec.vision.images import fit_image
 from placerec.vision.sources import describe_sources, train_dictionary
-from placerec.vision.spec import DescriptorSpec, descriptor
+from placerec.vision.spec import SETTINGS, DescriptorSpec, descriptor
 
 __all__ = [
+    "SETTINGS",
     "DescriptorSpec",
     "Descriptors",
     "Dictionary",
+    "centrist",
     "describe",
     "describe_sources",
     "descriptor",

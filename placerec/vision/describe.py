@@ -5,16 +5,17 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError, VisionError
-from placerec.frames import Sequence, read_gray
+from placerec.frames import Frame, Sequence, read_gray
+from placerec.vision.external import read_rows
 from placerec.vision.gist import Floats
-from placerec.vision.spec import DescriptorSpec, descriptor
+from placerec.vision.spec import DescriptorSpec, check_describes_images, descriptor
 from placerec.vision.storage import write_npz
 
 log = logging.getLogger(__name__)
@@ -52,44 +53,79 @@ def describe(
     sequences: Iterable[Sequence],
     spec: DescriptorSpec | None = None,
     *,
+    matrix: Path | str | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Descriptors:
     """The descriptor of every frame; an image that cannot be read is skipped, counted and named in a warning.
 
-    `spec`: None is the default one. `workers`: threads that read and describe, None for one a processor; the result
-    is the same for any number. Raises VisionError if no image can be read.
+    `spec`: None is the default one, or what `matrix` holds. `matrix`: a .npy or .npz file of descriptors that were
+    computed elsewhere (`external.read_rows`); no image is read then. `workers`: threads that read and describe, None
+    for one a processor; the result is the same for any number. Raises VisionError if no image can be read, or if the
+    matrix cannot be used or holds other descriptors than `spec` wants.
     """
-    spec = spec or DescriptorSpec()
     named = [(sequence.name, frame) for sequence in sequences for frame in sequence.frames]
+    if matrix is not None:
+        spec, values, kept = _given(named, spec, Path(matrix))
+        constant = 0
+    else:
+        spec = spec or DescriptorSpec()
+        check_describes_images(spec)
+        values, kept, constant = _made(named, spec, workers, progress)
+    skipped = len(named) - len(kept)
+    pictures = f", {constant} of one grey level throughout" if matrix is None else f"; rows of {matrix}"
+    log.info("%d frames described, %d skipped%s", len(kept), skipped, pictures)
+    found = [named[k] for k in kept]
+    return Descriptors(
+        spec,
+        values,
+        tuple(frame.name for _, frame in found),
+        tuple(sequence for sequence, _ in found),
+        np.array([frame.time for _, frame in found], np.float64),
+        tuple(frame.place for _, frame in found),
+        skipped,
+        constant,
+    )
+
+
+def _given(
+    named: list[tuple[str, Frame]], spec: DescriptorSpec | None, matrix: Path
+) -> tuple[DescriptorSpec, Floats, list[int]]:
+    """The specification and the rows of a matrix, and the indices of the frames that these are of."""
+    if spec is not None and spec.kind != "npy":
+        raise VisionError(f"{matrix}: is not wanted, for the dictionary is of {spec.kind} descriptors; leave it out")
+    values, kept = read_rows(matrix, [(sequence, frame.name) for sequence, frame in named])
+    if not kept:
+        raise VisionError(f"{matrix}: has a row for none of the {len(named)} frames; name the matrix of these sources")
+    if spec is not None and values.shape[1] != spec.columns:
+        raise VisionError(f"{matrix}: has rows of {values.shape[1]} values, and the dictionary's have {spec.columns}")
+    for k in sorted(set(range(len(named))) - set(kept)):
+        log.warning("%s: has no row for %s; the frame is skipped", matrix, named[k][1].path)
+    return spec or DescriptorSpec(kind="npy", columns=values.shape[1]), values, kept
+
+
+def _made(
+    named: list[tuple[str, Frame]], spec: DescriptorSpec, workers: int | None, progress: Progress | None
+) -> tuple[Floats, list[int], int]:
+    """The descriptors of images, the indices of the frames that they are of, and how many images are constant."""
     results = []
     for done, result in enumerate(_described([frame.path for _, frame in named], spec, workers), start=1):
         results.append(result)
         if progress is not None:
             progress(done, len(named))
-    kept = []
-    for (sequence, frame), result in zip(named, results, strict=True):
+    rows, kept = [], []
+    for k, result in enumerate(results):
         if isinstance(result, str):
             log.warning("%s; the frame is skipped", result)
         else:
-            kept.append((sequence, frame, result))
+            rows.append(result)
+            kept.append(k)
     if not kept:
         raise VisionError(f"none of the {len(named)} images can be read; name a folder with images")
-    constant = [str(frame.path) for _, frame, values in kept if not values.any()]
+    constant = [k for k, row in zip(kept, rows, strict=True) if not row.any()]
     if constant:
-        log.warning("%s: of one grey level throughout; its descriptor is zero", constant[0])
-    counts = len(kept), len(named) - len(kept), len(constant)
-    log.info("%d frames described, %d skipped, %d of one grey level throughout", *counts)
-    return Descriptors(
-        spec,
-        np.stack([values for _, _, values in kept]),
-        tuple(frame.name for _, frame, _ in kept),
-        tuple(sequence for sequence, _, _ in kept),
-        np.array([frame.time for _, frame, _ in kept], np.float64),
-        tuple(frame.place for _, frame, _ in kept),
-        len(named) - len(kept),
-        len(constant),
-    )
+        log.warning("%s: of one grey level throughout; its descriptor is zero", named[constant[0]][1].path)
+    return np.stack(rows), kept, len(constant)
 
 
 def _described(paths: Iterable[Path], spec: DescriptorSpec, workers: int | None) -> Iterator[Floats | str]:
@@ -133,6 +169,6 @@ def save_descriptors(descriptors: Descriptors, path: Path | str) -> None:
         "times": descriptors.times,
         "places": np.array(descriptors.places, np.str_),
     }
-    meta = {"format": "placerec-descriptors", "version": 1, "descriptor": asdict(descriptors.spec)}
+    meta = {"format": "placerec-descriptors", "version": 1, "descriptor": descriptors.spec.as_dict()}
     counts = {"skipped": descriptors.skipped, "constant": descriptors.constant}
     write_npz(Path(path), arrays, meta | counts)

@@ -205,7 +205,7 @@ class Dictionary:
             "format": FORMAT,
             "version": VERSION,
             "placerec": __version__,
-            "descriptor": asdict(self.spec),
+            "descriptor": self.spec.as_dict(),
             "training": asdict(self.training),
             "quality": asdict(self.quality),
         }

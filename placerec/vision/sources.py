@@ -20,16 +20,20 @@ def describe_sources(
     out: Path | str,
     *,
     spec: DescriptorSpec | None = None,
+    matrix: Path | str | None = None,
     format: str = "auto",
     progress: Progress | None = None,
 ) -> None:
     """Write the descriptors of all frames of the sources to `out`; `progress` is called with frames done and in all.
 
-    Raises SourceError for sources and VisionError for images that cannot be used, OutputError for the file.
+    `spec`, `matrix`: as for `describe`. Raises SourceError for sources and VisionError for images or a matrix that
+    cannot be used, OutputError for the file.
     """
     # The file comes first: that it cannot be written must not be found out after an hour of images.
     with whole_file(Path(out)) as partial:
-        save_descriptors(describe(find_sequences(sources, format=format), spec, progress=progress), partial)
+        save_descriptors(
+            describe(find_sequences(sources, format=format), spec, matrix=matrix, progress=progress), partial
+        )
 
 
 def train_dictionary(
@@ -37,6 +41,7 @@ def train_dictionary(
     out: Path | str,
     *,
     spec: DescriptorSpec | None = None,
+    matrix: Path | str | None = None,
     format: str = "auto",
     size: int = 10,
     components: int = 80,
@@ -51,14 +56,15 @@ def train_dictionary(
 ) -> Dictionary:
     """Describe the frames of the sources, fit a dictionary to them (`Dictionary.fit`) and write it to `out`.
 
-    `held_out`: sources that train nothing; how well the map represents them (`Dictionary.measure`) is noted.
-    `progress` is called with frames described and in all. Raises as `describe_sources` and `Dictionary.fit` do.
+    `spec`, `matrix`: as for `describe`. `held_out`: sources that train nothing; how well the map represents them
+    (`Dictionary.measure`) is noted. `progress` is called with frames described and in all. Raises as
+    `describe_sources` and `Dictionary.fit` do.
     """
     with whole_file(Path(out)) as partial:
         training, others = find_sequences(sources, format=format), find_sequences(held_out, format=format)
         seen, unseen = (sum(len(sequence.frames) for sequence in some) for some in (training, others))
         tell = progress or (lambda done, total: None)
-        described = describe(training, spec, progress=lambda done, _: tell(done, seen + unseen))
+        described = describe(training, spec, matrix=matrix, progress=lambda done, _: tell(done, seen + unseen))
         dictionary = Dictionary.fit(
             described.values,
             spec=described.spec,
@@ -74,7 +80,9 @@ def train_dictionary(
         dictionary.save(partial)
         _report(dictionary)
         if others:
-            more = describe(others, described.spec, progress=lambda done, _: tell(seen + done, seen + unseen))
+            more = describe(
+                others, described.spec, matrix=matrix, progress=lambda done, _: tell(seen + done, seen + unseen)
+            )
             _report_held_out(dictionary.measure(more))
     return dictionary
 

@@ -1,38 +1,80 @@
 """What a descriptor is made of: two descriptors may be compared only if their specifications are equal."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any
 
 from placerec.errors import VisionError
+from placerec.vision.centrist import LENGTH, centrist
+from placerec.vision.exact import TERMS
 from placerec.vision.gist import VARIANTS, Floats, gist
 from placerec.vision.images import FITS, SMALLEST, Gray, check_gray, fit_image
+
+# Kind -> the settings that it has. `npy`: computed elsewhere, of a length that its file tells.
+SETTINGS = {
+    "gist": ("variant", "image_size", "fit"),
+    "centrist": ("image_size", "fit"),
+    "npy": ("columns",),
+}
 
 
 @dataclass(frozen=True)
 class DescriptorSpec:
-    """GIST variant, side in pixels of the square that images are fitted to, and how they are fitted.
+    """The kind of a descriptor and its settings.
 
-    Raises VisionError for a value that does not exist.
+    variant: which GIST. image_size: side in pixels of the square that images are fitted to, and fit: how they are.
+    columns: the values of a descriptor that was computed elsewhere. Raises VisionError for a value that does not
+    exist, and for a setting that the kind does not have.
     """
 
     variant: str = "lmgist"
     image_size: int = 128
     fit: str = "squash"
+    kind: str = "gist"
+    columns: int = 0
 
     def __post_init__(self) -> None:
+        if self.kind not in tuple(SETTINGS):
+            raise VisionError(f"no descriptor is called {self.kind!r}; choose one of {', '.join(SETTINGS)}")
+        for field in fields(self):
+            if field.name not in ("kind", *SETTINGS[self.kind]) and getattr(self, field.name) != field.default:
+                raise VisionError(f"{self.kind} descriptors have no {field.name}; leave it out")
         if self.variant not in VARIANTS:
             raise VisionError(f"no GIST variant is called {self.variant!r}; choose one of {', '.join(VARIANTS)}")
         if self.fit not in FITS:
             raise VisionError(f"no fit is called {self.fit!r}; choose one of {', '.join(FITS)}")
         if not isinstance(self.image_size, int) or self.image_size < SMALLEST:
             raise VisionError(f"an image size of {self.image_size} cannot be used; give a number of {SMALLEST} or more")
+        if self.kind == "npy" and not (isinstance(self.columns, int) and 1 <= self.columns <= TERMS):
+            raise VisionError(f"descriptors of {self.columns} values cannot be used; they may have 1 to {TERMS}")
 
     @property
     def length(self) -> int:
-        """The number of values of a descriptor: 4 scales x 6 orientations x 4 x 4 blocks."""
-        return 4 * 6 * 4 * 4
+        """The number of values of a descriptor; GIST's are 4 scales x 6 orientations x 4 x 4 blocks."""
+        return {"gist": 4 * 6 * 4 * 4, "centrist": LENGTH, "npy": self.columns}[self.kind]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The kind and the settings that it has, as files hold them: `DescriptorSpec(**...)` is the way back."""
+        return {name: getattr(self, name) for name in ("kind", *SETTINGS[self.kind])}
+
+
+_ENGINES: dict[str, Callable[[Gray, DescriptorSpec], Floats]] = {
+    "gist": lambda gray, spec: gist(gray, variant=spec.variant),
+    "centrist": lambda gray, spec: centrist(gray),
+}
+
+
+def check_describes_images(spec: DescriptorSpec) -> None:
+    """Raise VisionError if descriptors of this kind are not made from images here."""
+    if spec.kind not in _ENGINES:
+        raise VisionError(
+            f"the dictionary's descriptors ({spec.columns} values) were computed elsewhere, and images cannot be "
+            "described so here; tokenize with --descriptor npy:FILE, and decode the token streams"
+        )
 
 
 def descriptor(gray: Gray, spec: DescriptorSpec) -> Floats:
     """The descriptor of one grey image (h, w) of 0..255: float32 (spec.length,), zeros if the image is constant."""
+    check_describes_images(spec)
     gray = check_gray(gray)
-    return gist(fit_image(gray, spec.image_size, spec.fit), variant=spec.variant)
+    return _ENGINES[spec.kind](fit_image(gray, spec.image_size, spec.fit), spec)

@@ -4,6 +4,8 @@ import hashlib
 import json
 import zipfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +31,7 @@ def read_npz(path: Path, names: tuple[str, ...]) -> tuple[Arrays, dict[str, Any]
 
     Raises VisionError without the file's name for anything that `write_npz` would not have written.
     """
-    try:
+    with reading():
         with zipfile.ZipFile(path) as archive:
             damaged = archive.testzip()
         if damaged is not None:
@@ -40,6 +42,16 @@ def read_npz(path: Path, names: tuple[str, ...]) -> tuple[Arrays, dict[str, Any]
                 raise VisionError(f"the array {missing[0]} is missing")
             arrays = {name: file[name] for name in names}
             meta = json.loads(str(file["meta"]))
+    if not isinstance(meta, dict):
+        raise VisionError("its meta is not a JSON object")
+    return arrays, meta
+
+
+@contextmanager
+def reading() -> Iterator[None]:
+    """What goes wrong within with a file of arrays becomes a VisionError without the file's name."""
+    try:
+        yield
     except FileNotFoundError as error:
         raise VisionError("no such file") from error
     except IsADirectoryError as error:
@@ -48,9 +60,6 @@ def read_npz(path: Path, names: tuple[str, ...]) -> tuple[Arrays, dict[str, Any]
         raise VisionError("it is not an npz file, or it is truncated") from error
     except (OSError, EOFError, ValueError, zlib.error, NotImplementedError, RuntimeError, MemoryError) as error:
         raise VisionError(f"it cannot be read: {error}") from error
-    if not isinstance(meta, dict):
-        raise VisionError("its meta is not a JSON object")
-    return arrays, meta
 
 
 def fingerprint(arrays: Arrays, meta: dict[str, Any]) -> str:

@@ -20,17 +20,19 @@ def tokenize(
     words: Path | str,
     out: Path | str,
     *,
+    matrix: Path | str | None = None,
     format: str = "auto",
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """`placerec tokenize`: write the tokens folder `out` (one .tsv per sequence, vocab.txt) of image sources.
 
-    `words`: the words.npz to use. tokens.json names its fingerprint, so that models know what they were trained on.
+    `words`: the words.npz to use. `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed
+    elsewhere (`describe`). tokens.json names its fingerprint, so that models know what they were trained on.
     """
     dictionary = Dictionary.load(Path(words))
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
     with whole_folder(Path(out), OWNED) as folder:
-        streams = streams_of(sources, dictionary, format=format, progress=progress)
+        streams = streams_of(sources, dictionary, matrix=matrix, format=format, progress=progress)
         _write(streams, dictionary, folder)
     seen = len({word for stream in streams for word in stream.words})
     log.info("%s: %d sequences, %d of %d words seen", out, len(streams), seen, len(dictionary.vocabulary))
@@ -40,12 +42,16 @@ def streams_of(
     sources: Iterable[Path | str],
     dictionary: Dictionary,
     *,
+    matrix: Path | str | None = None,
     format: str = "auto",
     progress: Callable[[int, int], None] | None = None,
 ) -> list[WordStream]:
-    """The token streams of image sources: each frame's best-matching unit in `dictionary`."""
+    """The token streams of image sources: each frame's best-matching unit in `dictionary`.
+
+    `matrix`: as for `tokenize`. Raises VisionError for a dictionary that needs one if there is none.
+    """
     sequences = find_sequences(sources, format=format)
-    streams = tokens_of(describe(sequences, dictionary.spec, progress=progress), dictionary)
+    streams = tokens_of(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary)
     for name in sorted({sequence.name for sequence in sequences} - {stream.name for stream in streams}):
         log.warning("%s: none of its images can be read; the sequence is left out", name)
     return streams

@@ -13,9 +13,12 @@ from small import PLACES, run_through, write_images, write_tokens
 
 from placerec.cli import commands
 from placerec.cli.train_lm import SMOOTHING_NAMES
+from placerec.frames import read_gray
 from placerec.lm import SMOOTHINGS
+from placerec.model import load_recognizer
 from placerec.srilm.run import TOOLS
-from placerec.words import write_stream
+from placerec.vision import Dictionary
+from placerec.words import read_stream, write_stream
 
 NAMES = sorted(set(commands.commands) - set(TOOLS))
 
@@ -231,6 +234,72 @@ def test_describe_writes_arrays(world: Path, tmp_path: Path) -> None:
         assert arrays["descriptors"].dtype == np.float32
         assert arrays["sequences"].tolist() == ["seq1"] * 12 + ["seq2"] * 12
         assert arrays["frames"].shape == (24,)
+
+
+def test_centrist_words_go_all_the_way(world: Path, tmp_path: Path) -> None:
+    words, tokens, model = (tmp_path / name for name in ("w.npz", "tokens", "model"))
+    args = ("--descriptor", "centrist", "--image-size", 16)
+    done("train-words", world / "runs/seq1", "-o", words, "--size", 2, *args)
+    done("tokenize", world / "runs", "-w", words, "-o", tokens)
+    done("train-lm", tokens / "seq1.tsv", "-o", model)
+    assert (
+        done("decode", world / "runs/seq2", "-m", model, "-w", words, "-q").stdout
+        == done("decode", tokens / "seq2.tsv", "-m", model, "-q").stdout
+    )
+    recognizer = load_recognizer(model, dictionary=Dictionary.load(words))
+    frame = sorted((world / "runs/seq2/std_cam").iterdir())[0]
+    assert recognizer.update(read_gray(frame)).word == read_stream(tokens / "seq2.tsv").words[0]
+    done("describe", world / "runs", "-o", tmp_path / "d.npz", *args)
+    with np.load(tmp_path / "d.npz", allow_pickle=False) as arrays:
+        assert arrays["descriptors"].shape == (24, 1016)
+
+
+def test_a_matrix_goes_all_the_way(world: Path, tmp_path: Path) -> None:
+    matrix = tmp_path / "a:b.npy"
+    np.save(matrix, np.random.default_rng(0).normal(size=(24, 6)))
+    given = ("--descriptor", f"npy:{matrix}")
+    words, tokens, model = (tmp_path / name for name in ("w.npz", "tokens", "model"))
+    done("train-words", world / "runs", "-o", words, "--size", 2, *given)
+    done("tokenize", world / "runs", "-w", words, "-o", tokens, *given)
+    done("train-lm", tokens, "-o", model)
+    assert len(done("decode", tokens / "seq2.tsv", "-m", model).stdout.splitlines()) == 13
+    way_out = "images cannot be described so here; tokenize with --descriptor npy:FILE, and decode the token streams"
+    no = ("-o", tmp_path / "no")
+    fails(way_out, "decode", world / "runs/seq2", "-m", model, "-w", words)
+    fails(way_out, "tokenize", world / "runs", "-w", words, *no)
+    fails("24 rows, and the sources have 12 frames", "tokenize", world / "runs/seq1", "-w", words, *no, *given)
+    fails(
+        "not wanted, for the dictionary is of gist", "tokenize", world / "runs", "-w", world / "words.npz", *no, *given
+    )
+    fails(r"none\.npy: no such file", "describe", world / "runs", *no, "--descriptor", f"npy:{tmp_path / 'none.npy'}")
+    # With their names beside them, the rows of any of the sequences can be taken.
+    done("describe", world / "runs", "-o", tmp_path / "d.npz", *given)
+    one = ("--descriptor", f"npy:{tmp_path / 'd.npz'}")
+    done("tokenize", world / "runs/seq1", "-w", words, "-o", tmp_path / "one", *one)
+    assert (tmp_path / "one/seq1.tsv").read_bytes() == (tokens / "seq1.tsv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--descriptor", "sift"), "'sift' is not one of gist, centrist, npy:FILE"),
+        (("--descriptor", "npy:"), "'npy:' is not one of gist, centrist, npy:FILE"),
+        (("--descriptor", "npy"), "'npy' is not one of gist, centrist, npy:FILE"),
+        (("--descriptor", "centrist", "--variant", "lmgist"), "--variant says nothing about centrist descriptors"),
+        (
+            ("--descriptor", "npy:a.npy", "--image-size", 64),
+            "--image-size says nothing about npy descriptors",
+        ),
+    ],
+)
+def test_descriptors_and_settings_that_do_not_exist(world: Path, options: tuple[object, ...], message: str) -> None:
+    for command in ("describe", "train-words"):
+        misused(message, command, world / "runs", "-o", world / "no", *options)
+
+
+def test_a_dictionary_knows_its_descriptor(world: Path) -> None:
+    words = ("-w", world / "words.npz", "-o", world / "no")
+    misused("'gist' is not one of npy:FILE", "tokenize", world / "runs", *words, "--descriptor", "gist")
 
 
 def test_broken_dictionaries_are_named(world: Path, tmp_path: Path) -> None:

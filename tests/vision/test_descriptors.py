@@ -116,7 +116,7 @@ def test_the_descriptors_file(tmp_path: Path) -> None:
         assert file["places"].tolist() == ["kitchen", "kitchen", "", ""]
         assert file["times"].tolist() == [0, 1, 2, 3]
         meta = json.loads(str(file["meta"]))
-    assert meta["descriptor"] == {"variant": "lmgist", "image_size": 128, "fit": "squash"}
+    assert meta["descriptor"] == {"kind": "gist", "variant": "lmgist", "image_size": 128, "fit": "squash"}
     assert (meta["skipped"], meta["constant"]) == (0, 0)
 
 

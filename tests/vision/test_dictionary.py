@@ -264,7 +264,7 @@ def test_the_file_is_arrays_and_json(tmp_path: Path, dictionary: Dictionary) -> 
         }
         meta = json.loads(str(file["meta"]))
     assert (meta["format"], meta["version"]) == ("placerec-words", 1)
-    assert meta["descriptor"] == {"variant": "lmgist", "image_size": 128, "fit": "squash"}
+    assert meta["descriptor"] == {"kind": "gist", "variant": "lmgist", "image_size": 128, "fit": "squash"}
     assert meta["training"] == {
         "size": 5,
         "components": 80,

@@ -93,3 +93,23 @@ def test_an_output_that_cannot_be_replaced_is_refused_before_any_image_is_read(
     monkeypatch.setattr("placerec.words.tokenize.describe", lambda *args, **options: pytest.fail("an image was read"))
     with pytest.raises(OutputError, match=r"holds photo\.jpeg"):
         tokenize([world / "runs"], world / "words.npz", tmp_path)
+
+
+def test_frames_of_a_matrix_become_words_and_no_image_is_read(world: Path, tmp_path: Path) -> None:
+    rows = np.random.default_rng(0).normal(size=(24, 6)).astype(np.float32)
+    np.save(tmp_path / "rows.npy", rows)
+    dictionary = Dictionary.fit(rows, spec=DescriptorSpec(kind="npy", columns=6), size=3)
+    dictionary.save(tmp_path / "words.npz")
+    write_images(tmp_path / "runs/seq1")
+    write_images(tmp_path / "runs/seq2")
+    for path in (tmp_path / "runs").rglob("*.png"):
+        path.write_bytes(b"")
+    tokenize([tmp_path / "runs"], tmp_path / "words.npz", tmp_path / "tokens", matrix=tmp_path / "rows.npy")
+    units, _ = dictionary.words(rows)
+    words = [*read_stream(tmp_path / "tokens/seq1.tsv").words, *read_stream(tmp_path / "tokens/seq2.tsv").words]
+    assert words == [f"w{unit}" for unit in units]
+    with pytest.raises(VisionError, match="tokenize with --descriptor npy:FILE, and decode the token streams"):
+        streams_of([tmp_path / "runs"], dictionary)
+    with pytest.raises(VisionError, match=r"rows\.npy: is not wanted, for the dictionary is of gist descriptors"):
+        tokenize([world / "runs"], world / "words.npz", tmp_path / "no", matrix=tmp_path / "rows.npy")
+    assert not (tmp_path / "no").exists()

@@ -1,0 +1,63 @@
+"""Specifications: what each kind has, what it has not, and the way into files and back."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from placerec.errors import VisionError
+from placerec.vision import DescriptorSpec, descriptor
+
+SPECS = [
+    DescriptorSpec(),
+    DescriptorSpec("classic", 64, "crop"),
+    DescriptorSpec(kind="centrist", image_size=96),
+    DescriptorSpec(kind="npy", columns=768),
+]
+
+
+@pytest.mark.parametrize("spec", SPECS, ids=str)
+def test_into_a_file_and_back(spec: DescriptorSpec) -> None:
+    assert DescriptorSpec(**spec.as_dict()) == spec
+
+
+def test_a_file_tells_what_the_kind_has_and_no_more() -> None:
+    assert [spec.as_dict() for spec in SPECS[1:]] == [
+        {"kind": "gist", "variant": "classic", "image_size": 64, "fit": "crop"},
+        {"kind": "centrist", "image_size": 96, "fit": "squash"},
+        {"kind": "npy", "columns": 768},
+    ]
+    assert [spec.length for spec in SPECS] == [384, 384, 1016, 768]
+
+
+def test_before_there_were_kinds_all_was_gist() -> None:
+    old: dict[str, Any] = {"variant": "classic", "image_size": 64, "fit": "crop"}
+    assert DescriptorSpec(**old) == SPECS[1]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"kind": "sift"}, "no descriptor is called 'sift'; choose one of gist, centrist, npy"),
+        ({"kind": []}, "no descriptor is called []"),
+        ({"variant": "new"}, "no GIST variant is called 'new'; choose one of lmgist, classic"),
+        ({"fit": "stretch"}, "no fit is called 'stretch'; choose one of squash, crop"),
+        ({"image_size": 7}, "an image size of 7 cannot be used; give a number of 8 or more"),
+        ({"kind": "centrist", "image_size": 7}, "an image size of 7 cannot be used"),
+        ({"kind": "centrist", "variant": "classic"}, "centrist descriptors have no variant; leave it out"),
+        ({"kind": "npy", "columns": 5, "image_size": 64}, "npy descriptors have no image_size; leave it out"),
+        ({"columns": 5}, "gist descriptors have no columns; leave it out"),
+        ({"kind": "npy"}, "descriptors of 0 values cannot be used; they may have 1 to 4096"),
+        ({"kind": "npy", "columns": 4097}, "descriptors of 4097 values cannot be used"),
+        ({"kind": "npy", "columns": "5"}, "descriptors of 5 values cannot be used"),
+    ],
+)
+def test_what_does_not_exist_is_refused(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(VisionError, match=re.escape(message)):
+        DescriptorSpec(**settings)
+
+
+def test_images_are_not_described_by_a_matrix() -> None:
+    with pytest.raises(VisionError, match=r"\(768 values\) were computed elsewhere.*; tokenize with --descriptor npy:"):
+        descriptor(np.zeros((20, 20), np.uint8), SPECS[3])
