@@ -1,21 +1,22 @@
 """Counting n-grams: one sort of packed windows gives the counts of all orders (any order, any vocabulary)."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.lm.row_index import RowIndex
+from placerec.lm.stored_text import BLOCK, Block, Numbers, StoredText
 from placerec.lm.trie import Ints, Trie, Vocabulary, build_trie, endings
+from placerec.lm.windows import changes, distinct_windows
 
-# Tokens counted at once.
-_BLOCK = 1 << 18
 SENTENCE_START, SENTENCE_END, UNKNOWN = "<s>", "</s>", "<unk>"
-Numbers = NDArray[Any]
 Mask = NDArray[np.bool_]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,22 +43,30 @@ def count_ngrams(
 
     With `markers`, every sentence is counted between <s> and </s>. With `vocabulary` the vocabulary is closed: other
     words are counted as <unk>. No n-gram spans two sentences. The semantics are those of ngram-count
-    (sections 3 and 4 of our SRILM specification).
+    (sections 3 and 4 of our SRILM specification). The sentences may be more than memory holds; OutputError if they
+    are, and a temporary file cannot be written.
     """
-    tokens: list[int] = []
-    lengths: list[int] = []
     numbers: defaultdict[str, int] = defaultdict(lambda: len(numbers))
     for word in (UNKNOWN, SENTENCE_START, SENTENCE_END, *(vocabulary or ())):
         numbers[word]
-    closed = vocabulary is not None
+    number = partial(_listed, numbers) if vocabulary is not None else numbers.__getitem__
+    text = StoredText()
+    tokens: list[int] = []
+    lengths: list[int] = []
     for sentence in sentences:
         words = _marked(sentence) if markers else sentence
-        if words:
-            tokens.extend([numbers.get(word, 0) for word in words] if closed else [numbers[word] for word in words])
-            lengths.append(len(words))
+        tokens.extend(map(number, words))
+        lengths.append(len(words))
+        if len(tokens) >= BLOCK:
+            text.add(np.array(tokens, np.int64), np.array(lengths, np.int64))
+            tokens, lengths = [], []
+    text.add(np.array(tokens, np.int64), np.array(lengths, np.int64))
     ordered = Vocabulary.of(numbers)
-    ids = ordered.ids(list(numbers))[np.array(tokens, np.int64)]
-    return count_ids(ids, np.array(lengths, np.int64), order, ordered)
+    return count_text(text, order, ordered, renumbered=ordered.ids(list(numbers)))
+
+
+def _listed(numbers: Mapping[str, int], word: str) -> int:
+    return numbers.get(word, 0)
 
 
 def _marked(sentence: Sequence[str]) -> list[str]:
@@ -66,104 +75,53 @@ def _marked(sentence: Sequence[str]) -> list[str]:
     return [*start, *sentence, *end] if sentence else []
 
 
-def count_ids(
-    ids: Ints,
-    lengths: Ints,
-    order: int,
-    vocabulary: Vocabulary,
-    *,
-    weights: Numbers | None = None,
-    renumbered: Ints | None = None,
+def count_text(
+    text: StoredText, order: int, vocabulary: Vocabulary, *, renumbered: Ints | None = None, fractional: bool = False
 ) -> NgramCounts:
-    """Count the n-grams of word numbers `ids` (T,), cut into sentences of `lengths`.
+    """Count the n-grams of a text, each as often as its sentence weighs (once, if sentences have no weights).
 
-    `weights` (T,), int64 or float64: what an n-gram counts for that starts at this word; 1 by default.
-    `renumbered`: the vocabulary's number of each word number, if `ids` are others.
+    `renumbered`: the vocabulary's number of each word number of the text, if that has others. `fractional`: counts
+    are float64; otherwise weights must be integers. Beside the text, memory holds a few times the n-grams.
     """
     bits = max(1, len(vocabulary).bit_length())
-    if order * bits > 63:
-        known = ids if renumbered is None else renumbered[ids]
-        columns, counts = _wide_windows(known, lengths, order, bits, weights)
-    else:
-        windows, counts = _distinct_windows(ids, lengths, order, bits, weights, renumbered)
-        columns = [(windows, order)]
-    return _table(columns, counts, bits, vocabulary)
-
-
-def _distinct_windows(
-    ids: Ints, lengths: Ints, order: int, bits: int, weights: Numbers | None, renumbered: Ints | None
-) -> tuple[Ints, Numbers]:
-    """The distinct windows of `order` words, packed and ascending, and how often each occurs.
-
-    Block by block, since sorting what fits in a cache is faster, and two at a time.
-    """
-    ends = np.cumsum(lengths)
-    cuts = np.unique(np.searchsorted(ends, np.arange(_BLOCK, len(ids) + _BLOCK, _BLOCK), side="left") + 1)
-    cuts = np.concatenate([[0], np.minimum(cuts, len(lengths))]) if len(ids) > _BLOCK else np.array([0, len(lengths)])
-
-    def block(i: int) -> tuple[Ints, Numbers]:
-        first, last = int(cuts[i]), int(cuts[i + 1])
-        start, end = (int(ends[first - 1]) if first else 0), int(ends[last - 1]) if last else 0
-        known = ids[start:end] if renumbered is None else renumbered[ids[start:end]]
-        packed = _packed_windows(known, lengths[first:last], range(order), bits)
-        return _summed(packed, None if weights is None else weights[start:end])
-
-    if len(cuts) == 2:
-        return block(0)
-    with ThreadPoolExecutor(2) as pool:
-        parts = list(pool.map(block, range(len(cuts) - 1)))
-    windows = np.concatenate([windows for windows, _ in parts])
-    return _summed(windows, np.concatenate([counts for _, counts in parts]))
-
-
-def _summed(windows: Ints, weights: Numbers | None) -> tuple[Ints, Numbers]:
-    """The distinct windows, ascending, and the sums of their weights."""
-    if weights is None:
-        windows = np.sort(windows)
-        starts = np.flatnonzero(_changes(windows))
-        return windows[starts], np.diff(starts, append=len(windows))
-    order = np.argsort(windows, kind="stable")
-    windows = windows[order]
-    starts = np.flatnonzero(_changes(windows))
-    return windows[starts], np.add.reduceat(weights[order], starts) if len(starts) else weights
-
-
-def _wide_windows(
-    ids: Ints, lengths: Ints, order: int, bits: int, weights: Numbers | None
-) -> tuple[list[tuple[Ints, int]], Numbers]:
-    """Distinct windows that need more than one number each: columns of packed words, and the counts."""
     width = max(1, 63 // bits)
     spans = [range(start, min(start + width, order)) for start in range(0, order, width)]
-    columns = [_packed_windows(ids, lengths, span, bits) for span in spans]
-    by_window = np.lexsort(columns[::-1])
-    columns = [column[by_window] for column in columns]
-    starts = np.flatnonzero(np.any([_changes(column) for column in columns], axis=0))
-    counted = np.ones(len(ids), np.int64) if weights is None else weights[by_window]
-    counts = np.add.reduceat(counted, starts) if len(starts) else counted
-    return [(column[starts], len(span)) for column, span in zip(columns, spans, strict=True)], counts
+    columns, counts = distinct_windows(text, spans, bits, renumbered=renumbered, weighted=not fractional)
+    table = _table([(column, len(span)) for column, span in zip(columns, spans, strict=True)], counts, bits, vocabulary)
+    if fractional and text.weighted:
+        return replace(table, counts=_real_sums(text, table.trie, renumbered))
+    return replace(table, counts=tuple(count.astype(np.float64) for count in table.counts)) if fractional else table
 
 
-def _packed_windows(ids: Ints, lengths: Ints, span: range, bits: int) -> Ints:
-    """The words at these distances from each position, packed (T,); 0 stands for what is behind the sentence's end."""
-    packed = np.zeros(len(ids), np.int64)
-    symbols = ids + 1
-    ends = np.cumsum(lengths)
-    for distance in span:
-        packed <<= bits
-        packed[: max(0, len(ids) - distance)] |= symbols[distance:]
-    # The last words of each sentence reached into the next one.
-    for left in range(1, span.stop):
-        at = (ends - left)[lengths >= left]
-        shifts = [bits * (span.stop - 1 - distance) for distance in span if distance >= left]
-        keep = ~sum(((1 << bits) - 1) << shift for shift in shifts)
-        packed[at] &= keep
-    return packed
+def _real_sums(text: StoredText, trie: Trie, renumbered: Ints | None) -> tuple[Floats, ...]:
+    """The counts with real weights, added up in the order of the text: SRILM's sums, to the last digit."""
+    sums = [np.zeros(len(keys)) for keys in trie.keys]
+    for block, found in occurrences(text, trie, renumbered):
+        weights = np.repeat(cast(Floats, block.weights), block.lengths)
+        for its, (position, row) in zip(sums, found, strict=True):
+            np.add.at(its, row, weights[position])
+    return tuple(sums)
 
 
-def _changes(values: Ints) -> Mask:
-    changed = np.ones(len(values), bool)
-    np.not_equal(values[1:], values[:-1], out=changed[1:])
-    return changed
+def occurrences(
+    text: StoredText, trie: Trie, renumbered: Ints | None = None
+) -> Iterator[tuple[Block, list[tuple[Ints, Ints]]]]:
+    """Per block of a text and per order, where in the block n-grams start, ascending, and their rows: two int64 (m,).
+
+    `renumbered`: as in `count_text`. All n-grams of the text must be in `trie`.
+    """
+    indexes = [RowIndex(keys) for keys in trie.keys[1:]]
+    for block in text:
+        ids = block.ids.astype(np.int64) if renumbered is None else renumbered[block.ids]
+        end = np.repeat(np.cumsum(block.lengths, dtype=np.int64), block.lengths)
+        position, row = np.arange(len(ids)), ids
+        found = [(position, row)]
+        for n, index in enumerate(indexes, start=2):
+            inside = position + n <= end[position]
+            position = position[inside]
+            row = index.find(row[inside] * len(trie.vocabulary) + ids[position + n - 1])
+            found.append((position, row))
+        yield block, found
 
 
 def _table(columns: Sequence[tuple[Ints, int]], counts: Numbers, bits: int, vocabulary: Vocabulary) -> NgramCounts:
@@ -196,7 +154,7 @@ def _digits(columns: Sequence[tuple[Ints, int]], bits: int) -> Iterator[tuple[In
     for packed, width in columns:
         for left in range(width - 1, -1, -1):
             digit = (packed >> (bits * left)) & ((1 << bits) - 1)
-            yield digit, _changes(digit)
+            yield digit, changes(digit)
 
 
 def tabulate(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints], values: Sequence[Numbers]) -> NgramCounts:

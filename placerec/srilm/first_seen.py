@@ -36,7 +36,7 @@ class FirstSeen:
                     first[n - 1][row] = np.minimum(first[n - 1][row], now)
                 now += 1
         if self.text is not None:
-            for n, its in enumerate(first_positions(sorted_number[self.text.numbers], self.text.lengths, trie)):
+            for n, its in enumerate(first_positions(self.text.stored, trie, sorted_number)):
                 first[n] = np.minimum(first[n], np.where(its < never - now, its + now, never))
         return first
 

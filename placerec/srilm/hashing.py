@@ -13,6 +13,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.lm.counts import occurrences
+from placerec.lm.stored_text import StoredText
 from placerec.lm.trie import Ints, Trie
 
 Mask = NDArray[np.bool_]
@@ -149,21 +151,17 @@ def _subtrees(rows: Sequence[Ints], parents: Sequence[Ints], sizes: Sequence[int
     return below
 
 
-def first_positions(ids: Ints, lengths: Ints, trie: Trie) -> list[Ints]:
-    """Per order, where each n-gram first starts in a text of word numbers `ids` (T,): int64 (m_n,), T if nowhere.
+def first_positions(text: StoredText, trie: Trie, renumbered: Ints) -> list[Ints]:
+    """Per order, where each n-gram first starts in a text: int64 (m_n,), the number of its words if nowhere.
 
-    `lengths`: those of its sentences, which n-grams do not cross.
+    `renumbered`: the number in `trie` of each word number of the text.
     """
-    end = np.repeat(np.cumsum(lengths), lengths)
-    position = np.arange(len(ids))
-    row = ids
-    found = []
-    for n in range(1, trie.order + 1):
-        inside = position + n <= end[position]
-        position = position[inside]
-        row = trie.find(n, row[inside], ids[position + n - 1])
-        first = np.full(len(trie.keys[n - 1]), len(ids), np.int64)
-        # Of several values for one row the last is kept: reversed, the earliest.
-        first[row[::-1]] = position[::-1]
-        found.append(first)
+    found = [np.full(len(keys), text.tokens) for keys in trie.keys]
+    before = 0
+    for block, its in occurrences(text, trie, renumbered):
+        for first, (position, row) in zip(found, its, strict=True):
+            new = first[row] == text.tokens
+            # Of several values for one row the last is kept: reversed, the earliest.
+            first[row[new][::-1]] = before + position[new][::-1]
+        before += len(block.ids)
     return found

@@ -139,7 +139,9 @@ def _read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[Ngram
         tables.append(table.within(only) if only else table)
     text = None
     if options["text"] and options["write-text"]:
-        streams.write(options["write-text"], "".join(f"{line}\n" for line in streams.lines(options["text"])))
+        lines = streams.lines(options["text"])
+        with streams.output(options["write-text"]) as file:
+            file.writelines(f"{line}\n".encode("latin-1") for line in lines)
     elif options["text"]:
         text = _read_text(options, words, streams)
     parts = [table.count(max(1, order), words, fractional=fractional) for table in tables]
@@ -158,11 +160,9 @@ def _read_text(options: Parsed, words: WordList, streams: Streams) -> Text:
     marking = Marking(not options["no-sos"], not options["no-eos"], weight, options["float-counts"])
     text = read_text(options["text"], words, marking, streams)
     if options["debug"] >= 1:
-        sentences = len(text.lengths)
-        streams.say(
-            f"{options['text']}: line {text.lines}: {sentences} sentences, {text.words} words, {text.unknown} OOVs"
-        )
-        if text.words + sentences > 0:
+        said = f"{text.sentences} sentences, {text.words} words, {text.unknown} OOVs"
+        streams.say(f"{options['text']}: line {text.lines}: {said}")
+        if text.words + text.sentences > 0:
             streams.say("0 zeroprobs, logprob= 0 ppl= 1 ppl1= " + ("1" if text.words else "undefined"))
     return text
 

@@ -5,7 +5,7 @@ Text is handled as bytes kept in str (Latin-1), so that no byte is lost and word
 
 import os
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
@@ -121,7 +121,8 @@ class Streams:
 class Lines:
     """Iterates over the lines of a file that are neither blank nor comments; `number` is that of the last line read.
 
-    A line is read when it is asked for. `data` is the whole file, for those who take it apart themselves.
+    A line is read when it is asked for. `data` is the whole file, and `blocks` are its parts, for those who take it
+    apart themselves.
     """
 
     def __init__(self, name: str, source: BinaryIO, streams: Streams) -> None:
@@ -154,19 +155,31 @@ class Lines:
 
     def __iter__(self) -> Iterator[str]:
         with _named(self.name), self.streams.closing(self.source):
-            begun = ""
-            for physical in self._physical():
-                self.number += 1
-                line = physical.decode("latin-1").removesuffix("\n")
-                if "\0" in line:
-                    # What follows a NUL byte is lost, the line end with it.
-                    begun += line.partition("\0")[0]
-                    continue
-                whole, begun = begun + line, ""
-                if whole.strip(SPACES) and not whole.startswith("##"):
-                    yield whole
-            if begun.strip(SPACES) and not begun.startswith("##"):
-                yield begun
+            yield from self.of(self._physical())
+
+    def of(self, physical: Iterable[bytes]) -> Iterator[str]:
+        """The lines that physical lines make, which are counted."""
+        begun = ""
+        for line_and_end in physical:
+            self.number += 1
+            line = line_and_end.decode("latin-1").removesuffix("\n")
+            if "\0" in line:
+                # What follows a NUL byte is lost, the line end with it.
+                begun += line.partition("\0")[0]
+                continue
+            whole, begun = begun + line, ""
+            if whole.strip(SPACES) and not whole.startswith("##"):
+                yield whole
+        if begun.strip(SPACES) and not begun.startswith("##"):
+            yield begun
+
+    def blocks(self, size: int) -> Iterator[bytes]:
+        """The file in blocks of whole physical lines, of `size` bytes or a little more; they are not counted."""
+        with _named(self.name), self.streams.closing(self.source):
+            block = self._unmarked(self.source.read(size) + self.source.readline())
+            while block:
+                yield block
+                block = self.source.read(size) + self.source.readline()
 
     @property
     def position(self) -> str:

@@ -1,25 +1,25 @@
 """Text to word numbers: section 4.1 of our SRILM specification."""
 
-import io
-from collections import deque
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import islice
+from io import BytesIO
+from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, NgramCounts, count_ids
+from placerec.lm.ahead import work_ahead
+from placerec.lm.counts import SENTENCE_END, SENTENCE_START, NgramCounts, count_text
+from placerec.lm.stored_text import BLOCK, Numbers, StoredText
 from placerec.lm.trie import Ints
 from placerec.srilm.counts_file import parse_count
-from placerec.srilm.numbering import Cut, Numbering, cut_words
+from placerec.srilm.fields import unusual
+from placerec.srilm.numbering import Numbering, cut_words
 from placerec.srilm.streams import Lines, Streams, tokens
 from placerec.srilm.vocabulary import WordList
 
 LONGEST_LINE = 50000
-_BLOCK = 1 << 18
-_AHEAD = 4
+# Bytes that are taken apart at once.
+_BYTES = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -32,131 +32,121 @@ class Marking:
     fractional: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass
 class Text:
-    """The sentences of a text with their markers: SRILM's word numbers (T,), lengths (S,), weights (S,) or None.
+    """The sentences of a text with their markers, as SRILM's word numbers.
 
     `lines`: physical lines; `words`: tokens other than markers at the ends; `unknown`: those that are the unknown word.
     """
 
-    numbers: Ints = field(repr=False)
-    lengths: Ints = field(repr=False)
-    weights: NDArray[np.float64] | None = field(repr=False)
-    lines: int
-    words: int
-    unknown: int
+    stored: StoredText = field(default_factory=StoredText)
+    lines: int = 0
+    sentences: int = 0
+    words: int = 0
+    unknown: int = 0
 
     def count(self, order: int, words: WordList, *, fractional: bool) -> NgramCounts:
         """The counts of the n-grams of the text over the sorted vocabulary."""
         vocabulary, renumbered = words.sorted()
-        weights = None
-        if self.weights is not None:
-            weights = np.repeat(self.weights if fractional else self.weights.astype(np.int64), self.lengths)
-        elif fractional:
-            weights = np.ones(len(self.numbers))
         ids = np.array(renumbered, np.int64)
-        return count_ids(self.numbers, self.lengths, order, vocabulary, weights=weights, renumbered=ids)
+        return count_text(self.stored, order, vocabulary, renumbered=ids, fractional=fractional)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Some sentences of a text without their markers: word numbers (T,), lengths (S,) and weights (S,) or None."""
+
+    numbers: Ints
+    lengths: Ints
+    weights: Numbers | None = None
 
 
 def read_text(name: str, words: WordList, marking: Marking, streams: Streams) -> Text:
     """Read a text; words are added to an open vocabulary. Lines that cannot be used are reported and skipped."""
-    data = streams.read(name)
-    weights: list[float] | None = None
-    if marking.weight or data.startswith(_SPECIAL) or any(special in data for special in _SPECIALS):
-        lines = Lines(name, io.BytesIO(data), streams)
-        numbers, lengths, line_of, weights = _read_carefully(lines, words, marking, streams)
-        last = lines.number
-    else:
-        numbers, lengths = _read_quickly(data, words)
-        last = len(lengths)
-        line_of = np.arange(1, last + 1)
-    for line in line_of[lengths > LONGEST_LINE].tolist():
-        streams.say(f"{name}: line {line}: line too long?")
-    used = ((lengths > 0) | (weights is not None)) & (lengths <= LONGEST_LINE)
-    given = None if weights is None else np.array(weights, np.float64)[used]
-    if not used.all():
-        numbers, lengths = numbers[np.repeat(used, lengths)], lengths[used]
-    return _marked(numbers, lengths, given, last, words, marking)
+    lines = streams.lines(name)
+    text = Text()
+    for part in _parts(lines, words, marking, streams):
+        _add_marked(text, part, words, marking)
+    text.lines = lines.number
+    return text
 
 
-def _read_quickly(data: bytes, words: WordList) -> tuple[Ints, Ints]:
-    """The word numbers of all lines (T,), and how many each physical line holds (L,)."""
-    if data and not data.endswith(b"\n"):
-        data += b"\n"
-    numbering = Numbering(words)
-    numbers, lengths = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    # Words are cut beside, and numbered here in their order.
-    with ThreadPoolExecutor(2) as pool:
-        waiting: deque[Future[Cut]] = deque()
-        blocks = _blocks(data)
-        while True:
-            waiting.extend(pool.submit(cut_words, block) for block in islice(blocks, _AHEAD - len(waiting)))
-            if not waiting:
-                break
-            cut = waiting.popleft().result()
-            numbers.append(numbering.numbers_of(cut))
-            lengths.append(cut.per_line)
-    return np.concatenate(numbers), np.concatenate(lengths)
+def _parts(lines: Lines, words: WordList, marking: Marking, streams: Streams) -> Iterator[_Part]:
+    """A text part by part: quickly, and carefully from where the first comment, NUL, VT or FF is."""
+    blocks = lines.blocks(_BYTES)
+    if not marking.weight:
+        careful: list[bytes] = []
+        numbering = Numbering(words)
+        # Words are cut beside, and numbered here in their order.
+        for cut in work_ahead(cut_words, _usual(blocks, careful)):
+            if (cut.per_line > LONGEST_LINE).any():
+                yield from _read_carefully(lines, [cut.data], words, marking, streams)
+            else:
+                lines.number += len(cut.per_line)
+                yield _Part(numbering.numbers_of(cut), cut.per_line[cut.per_line > 0])
+        blocks = chain(careful, blocks)
+    yield from _read_carefully(lines, blocks, words, marking, streams)
 
 
-def _blocks(data: bytes) -> Iterator[bytes]:
-    """Whole lines."""
-    start = 0
-    while start < len(data):
-        end = data.find(b"\n", min(len(data) - 1, start + _BLOCK)) + 1
-        yield data[start:end]
-        start = end
-
-
-# What only the careful reader understands: comments, byte-order marks; NUL, vertical tabs and form feeds.
-_SPECIAL = (b"##", b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
-_SPECIALS = (b"\n##", b"\0", b"\v", b"\f")
+def _usual(blocks: Iterable[bytes], unusual_one: list[bytes]) -> Iterator[bytes]:
+    """The blocks before the first unusual one, which is handed back, each with a line end."""
+    for block in blocks:
+        if unusual(block):
+            unusual_one.append(block)
+            return
+        yield block if block.endswith(b"\n") else block + b"\n"
 
 
 def _read_carefully(
-    lines: Lines, words: WordList, marking: Marking, streams: Streams
-) -> tuple[Ints, Ints, Ints, list[float] | None]:
-    """The same line by line, with the lines' numbers and weights."""
+    lines: Lines, blocks: Iterable[bytes], words: WordList, marking: Marking, streams: Streams
+) -> Iterator[_Part]:
     numbers: list[int] = []
     lengths: list[int] = []
-    line_of: list[int] = []
     weights: list[float] = []
-    for found, weight in _weighted(lines, marking, streams):
+
+    def part() -> _Part:
+        weight = np.array(weights, np.float64 if marking.fractional else np.int64) if marking.weight else None
+        return _Part(np.array(numbers, np.int64), np.array(lengths, np.int64), weight)
+
+    for found, weight in _sentences(lines, blocks, marking, streams):
         numbers += [words.number(word) for word in found]
         lengths.append(len(found))
-        line_of.append(lines.number)
         weights.append(weight)
-    arrays = [np.array(values, np.int64) for values in (numbers, lengths, line_of)]
-    return arrays[0], arrays[1], arrays[2], weights if marking.weight else None
+        if len(numbers) + len(lengths) > BLOCK:
+            yield part()
+            numbers, lengths, weights = [], [], []
+    yield part()
 
 
-def _weighted(lines: Lines, marking: Marking, streams: Streams) -> Iterator[tuple[list[str], float]]:
-    for line in lines:
+def _sentences(
+    lines: Lines, blocks: Iterable[bytes], marking: Marking, streams: Streams
+) -> Iterator[tuple[list[str], float]]:
+    """The words and weights of the lines that can be used; the others are reported."""
+    for line in lines.of(physical for block in blocks for physical in BytesIO(block)):
         words = tokens(line)
-        weight: float | None = 1.0
-        if marking.weight and words:
+        weight: float | None = 1
+        if marking.weight:
             weight = parse_count(words.pop(0 if marking.weight == "first" else -1), marking.fractional)
         if weight is None:
             streams.say(f"{lines.position}illegal count weight or line too long?")
+        elif len(words) > LONGEST_LINE:
+            streams.say(f"{lines.position}line too long?")
         else:
             yield words, weight
 
 
-def _marked(
-    numbers: Ints,
-    lengths: Ints,
-    weights: NDArray[np.float64] | None,
-    lines: int,
-    words: WordList,
-    marking: Marking,
-) -> Text:
-    """The sentences with the markers that they lack."""
+def _add_marked(text: Text, part: _Part, words: WordList, marking: Marking) -> None:
+    """Add sentences to the text, with the markers that they lack."""
+    numbers, lengths = part.numbers, part.lengths
     begin, end = words.index.get(SENTENCE_START, -1), words.index.get(SENTENCE_END, -1)
     stops = np.cumsum(lengths)
     filled = lengths > 0
     opened, ended = np.zeros(len(lengths), bool), np.zeros(len(lengths), bool)
     opened[filled] = numbers[(stops - lengths)[filled]] == begin
     ended[filled] = numbers[(stops - 1)[filled]] == end
+    text.sentences += len(lengths)
+    text.words += int((lengths - opened - ended).sum())
+    text.unknown += int((numbers == words.index.get(words.unknown, -1)).sum())
     before, after = ~opened & marking.start, ~ended & marking.end
     whole = lengths + before + after
     if (before | after).any():
@@ -167,8 +157,5 @@ def _marked(
         given[first] = given[last] = False
         marked[given] = numbers
         marked[first], marked[last] = begin, end
-        plain, numbers = numbers, marked
-    else:
-        plain = numbers
-    unknown = int((plain == words.index.get(words.unknown, -1)).sum())
-    return Text(numbers, whole, weights, lines, int((lengths - opened - ended).sum()), unknown)
+        numbers = marked
+    text.stored.add(numbers, whole, part.weights)

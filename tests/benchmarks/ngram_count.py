@@ -1,5 +1,7 @@
 """How long bin/ngram-count takes from a text to an ARPA file, in units of what KenLM takes to load that file.
 
+Also the most memory that it uses, for the text and for the same text eight times over.
+
     python tests/benchmarks/ngram_count.py [TOKENS]
 
 The text is made from a seed: 400 visual words, each likely to repeat, in sentences of 500. With the environment
@@ -21,6 +23,12 @@ import numpy as np
 TOOL = Path(__file__).parents[2] / "bin" / "ngram-count"
 OPTIONS = ["-order", "4", "-wbdiscount", "-interpolate", "-gt3min", "1", "-gt4min", "1"]
 TURNS = 5
+# Runs a command and prints its peak of memory, in bytes on macOS and in kB elsewhere.
+CHILD = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True, stderr=subprocess.DEVNULL)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3))
+"""
 WORDS, SENTENCE, REPEAT = 400, 500, 0.7
 
 
@@ -49,8 +57,15 @@ def count(tool: str | Path, text: Path, model: Path) -> None:
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
 
 
+def peak(tool: str | Path, text: Path, model: Path) -> float:
+    """The most memory that one run of an ngram-count uses, in MB."""
+    # In a process of its own, since a new process's peak begins with its parent's size.
+    command = [sys.executable, "-c", CHILD, str(tool), "-text", str(text), *OPTIONS, "-lm", str(model)]
+    return float(subprocess.run(command, check=True, capture_output=True).stdout)
+
+
 def main(tokens: int) -> None:
-    """Print the median times and their ratios."""
+    """Print the median times and their ratios, and the memory."""
     config = kenlm.Config()
     config.show_progress, config.arpa_complain = False, kenlm.ARPALoadComplain.NONE
     reference = os.environ.get("REFERENCE")
@@ -65,8 +80,12 @@ def main(tokens: int) -> None:
                 theirs.append(seconds(lambda: count(reference, text, other)))
                 if other.read_bytes() != model.read_bytes():
                     print("the files differ")
+        peaks = [peak(TOOL, text, model)]
+        text.write_bytes(text.read_bytes() * 8)
+        peaks.append(peak(TOOL, text, model))
     print(f"{tokens} tokens: ngram-count {statistics.median(ours):.3f} s, KenLM loads {statistics.median(loads):.3f} s")
     print(f"ngram-count / KenLM: {statistics.median(a / b for a, b in zip(ours, loads, strict=True)):.2f}")
+    print(f"most memory: {peaks[0]:.0f} MB; for the text eight times over: {peaks[1]:.0f} MB")
     if reference:
         print(f"ngram-count / reference: {statistics.median(a / b for a, b in zip(ours, theirs, strict=True)):.2f}")
 

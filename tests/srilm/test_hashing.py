@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from placerec.lm.counts import count_ids
+from placerec.lm.counts import count_text
+from placerec.lm.stored_text import StoredText
 from placerec.srilm.hashing import capacities, first_positions, name_keys, needed, slot_order, walk_order
 from placerec.srilm.streams import tokens
 from placerec.srilm.vocabulary import WordList
@@ -118,9 +119,10 @@ def test_unsorted_counts_come_in_the_order_of_srilm(case_id: str, shared: Path) 
     words = WordList()
     numbers, lengths = read_sentences(golden / case["inputs"][0], words)
     vocabulary, renumbered = words.sorted()
-    ids = np.array(renumbered)[numbers]
-    counts = count_ids(ids, np.array(lengths), order, vocabulary)
-    first = first_positions(ids, np.array(lengths), counts.trie)
+    text, sorted_number = StoredText(), np.array(renumbered)
+    text.add(np.array(numbers), np.array(lengths))
+    counts = count_text(text, order, vocabulary, renumbered=sorted_number)
+    first = first_positions(text, counts.trie, sorted_number)
     orders, rows = walk_order(counts.trie, counts.seen, first, np.argsort(renumbered))
     texts = [counts.trie.texts(n) for n in range(1, order + 1)]
     shown = [
@@ -131,8 +133,8 @@ def test_unsorted_counts_come_in_the_order_of_srilm(case_id: str, shared: Path) 
 
 
 def test_a_walk_of_nothing_is_empty() -> None:
-    vocabulary, _ = WordList().sorted()
-    counts = count_ids(np.zeros(0, np.int64), np.zeros(0, np.int64), 3, vocabulary)
-    first = first_positions(np.zeros(0, np.int64), np.zeros(0, np.int64), counts.trie)
+    vocabulary, renumbered = WordList().sorted()
+    counts = count_text(StoredText(), 3, vocabulary)
+    first = first_positions(StoredText(), counts.trie, np.array(renumbered))
     orders, rows = walk_order(counts.trie, counts.seen, first, np.arange(len(vocabulary)))
     assert orders.tolist() == rows.tolist() == []
