@@ -28,6 +28,7 @@ _ROOMS = {
     ),
     "placerec.model": ("Options", "decode", "load_recognizer", "train_lm", "update"),
     "placerec.evaluation": ("evaluate", "evaluate_files"),
+    "placerec.evaluation.look": ("show_frame", "show_words", "stability"),
     "placerec.lab": ("render_lab",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
@@ -35,6 +36,7 @@ _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 if TYPE_CHECKING:
     from placerec.errors import PlacerecError
     from placerec.evaluation import evaluate, evaluate_files
+    from placerec.evaluation.look import show_frame, show_words, stability
     from placerec.frames import Frame, Sequence, find_sequences, read_gray
     from placerec.hohmm import (
         Belief,
@@ -89,7 +91,10 @@ __all__ = [
     "read_stream",
     "render_lab",
     "select",
+    "show_frame",
+    "show_words",
     "smoothing",
+    "stability",
     "tokenize",
     "train_dictionary",
     "train_lm",
