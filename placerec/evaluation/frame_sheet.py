@@ -76,7 +76,7 @@ def _windows(axes: "Axes", picture: NDArray[Any], title: str, paleness: float = 
     """The picture with the lines between its windows; `paleness` 1 is white."""
     side = picture.shape[0]
     shown = picture * (1 - paleness) + 255 * paleness
-    axes.imshow(shown, cmap="gray", vmin=0, vmax=255, extent=(0, side, side, 0))
+    axes.imshow(shown, cmap="gray", vmin=0, vmax=255, extent=(0, side, side, 0), interpolation="nearest")
     for line in np.arange(1, _BLOCKS) * side / _BLOCKS:
         axes.axhline(line, color="0.75", linewidth=0.7)
         axes.axvline(line, color="0.75", linewidth=0.7)
@@ -90,7 +90,7 @@ def _roses(axes: "Axes", picture: NDArray[Any], energy: NDArray[np.float32], nam
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 
-    _windows(axes, picture, f"Edges of the {name} scale", paleness=0.8)
+    _windows(axes, picture, f"Edges of the {name} scale", paleness=0.85)
     cell = picture.shape[0] / _BLOCKS
     largest = float(energy.max()) or 1.0
     petals = []

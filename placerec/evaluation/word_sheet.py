@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Inches.
-_MARGIN, _SIDE, _GAP, _ROW, _MAP = 0.3, 3.6, 0.5, 0.2, 3.0
+_MARGIN, _SIDE, _GAP, _ROW = 0.3, 3.6, 0.5, 0.2
 _LEAST_WIDTH = 10.0
 # Pixels across a tile in the picture; the rest of a tile's cell, in shares of its width, is frame and bar.
 _PIXELS = 128
@@ -60,14 +60,16 @@ def draw_word_sheet(table: WordTable, images: Sequence[Path | None], path: Path 
     shapes = [picture.shape for picture in pictures if picture is not None]
     aspect = float(np.clip(np.median([height / width for height, width in shapes]), 0.5, 1.5))
     # Big enough to be recognised, as long as the sheet can be opened at all.
-    tiles = _Tiles(table.size, min(1.6, max(0.8, 11 / table.size), 32 / table.size), aspect)
+    tiles = _Tiles(table.size, min(1.6, max(0.8, 5 / table.size), 32 / table.size), aspect)
     lattice = tiles.width * table.size, tiles.height * table.size
     width = max(_LEAST_WIDTH, 2 * _MARGIN + 0.3 + lattice[0] + _GAP + _SIDE)
     lines = [line for text in (*word_sentences(table), _READING) for line in _wrapped(text, width - 2 * _MARGIN, 8.5)]
     head = 0.62 + 0.17 * len(lines)
     legend = _ROW * (len(table.places) + 2)
-    # Both maps below each other beside a large lattice, else side by side and small.
-    maps = _MAP if legend + 2 * (_MAP + 0.8) <= lattice[1] + 0.3 else (_SIDE - 0.3) / 2
+    # Below each other where the lattice is high enough for it, else side by side.
+    beside = (_SIDE - 0.3) / 2
+    below = min(3.0, (lattice[1] + 0.2 - legend) / 2 - 0.75)
+    maps = max(beside, below)
     height = head + max(0.3 + lattice[1], legend + 0.8 + maps) + _MARGIN
     with figure_file(path, width, height) as figure:
 
@@ -80,7 +82,7 @@ def draw_word_sheet(table: WordTable, images: Sequence[Path | None], path: Path 
         _legend(panel(side, head, _SIDE, legend), table)
         top = head + legend + 0.5
         _heat(panel(side, top, maps, maps), table, table.hits, "Blues", "Training frames per unit")
-        spot = (side, top + _MAP + 0.8) if maps == _MAP else (side + maps + 0.3, top)
+        spot = (side, top + maps + 0.75) if below >= beside else (side + maps + 0.3, top)
         _heat(panel(*spot, maps, maps), table, table.u_matrix, "Greys", "U-matrix")
 
 

@@ -150,11 +150,13 @@ def word_sentences(table: WordTable) -> list[str]:
     frames, sequences = len(table.frame_names), len(set(table.sequence_names))
     live = int((table.hits > 0).sum())
     seen = int((table.frames > 0).sum())
+    which = "all" if live == len(table.words) else str(live)
     told = [
-        f"{len(table.words)} units, {live} of them hit in training; {seen} are words of "
-        f"{_some(frames, 'frame')} in {_some(sequences, 'sequence')}.",
-        _dead_sentence(table),
+        f"{len(table.words)} units, {which} of them hit in training; {seen} are words of "
+        f"{_some(frames, 'frame')} in {_some(sequences, 'sequence')}."
     ]
+    if live < len(table.words):
+        told.append(_dead_sentence(table))
     labelled = int(table.votes.sum())
     if labelled:
         told.append(
@@ -182,8 +184,6 @@ def format_words(table: WordTable) -> str:
 
 def _dead_sentence(table: WordTable) -> str:
     dead = int((table.hits == 0).sum())
-    if not dead:
-        return "Every unit was hit in training."
     what = f"{_some(dead, 'unit')} that no training frame hit"
     if table.is_training:
         return f"{what}: these frames trained the map, so that none is nearest to one."
