@@ -185,8 +185,8 @@ def format_words(table: WordTable) -> str:
 def _dead_sentence(table: WordTable) -> str:
     dead = int((table.hits == 0).sum())
     what = f"{_some(dead, 'unit')} that no training frame hit"
-    if table.is_training:
-        return f"{what}: these frames trained the map, so that none is nearest to one."
+    if not table.to_dead:
+        return f"{what}: none of these frames is nearest to one{', for they trained the map' * table.is_training}."
     reach = f"{percent(table.to_dead / len(table.frame_names))} of the frames"
     if table.units == "live":
         return f"{what}: {reach} are nearest to one, and get the word of the nearest live unit instead."

@@ -133,7 +133,9 @@ def test_the_text_tells_what_matters() -> None:
 def test_the_text_of_other_tables() -> None:
     text = format_words(by_hand(units="all"))
     assert "14.3 % of the frames are nearest to one and have it as word, which no language model has seen." in text
-    assert "these frames trained the map" in format_words(by_hand(is_training=True, to_dead=0))
+    assert "hit: none of these frames is nearest to one.\n" in format_words(by_hand(to_dead=0))
+    trained = format_words(by_hand(is_training=True, to_dead=0))
+    assert "hit: none of these frames is nearest to one, for they trained the map.\n" in trained
     whole = format_words(by_hand(hits=np.array([1, 1, 1, 1])))
     assert whole.startswith("4 units, all of them hit in training; 2 are words of 7 frames in 1 sequence.\n83.3 %")
     bare = by_hand(places=(), votes=np.zeros((4, 0), np.int64))
