@@ -30,6 +30,7 @@ _ROOMS = {
     ),
     "placerec.model": ("Decoding", "Options", "calibrate", "decode", "load_recognizer", "train_lm", "update"),
     "placerec.evaluation": ("evaluate", "evaluate_files"),
+    "placerec.evaluation.look": ("show_frame", "show_words", "stability"),
     "placerec.lab": ("render_lab",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
@@ -37,6 +38,7 @@ _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 if TYPE_CHECKING:
     from placerec.errors import PlacerecError
     from placerec.evaluation import evaluate, evaluate_files
+    from placerec.evaluation.look import show_frame, show_words, stability
     from placerec.frames import Frame, Sequence, find_sequences, read_gray
     from placerec.hohmm import (
         Belief,
@@ -97,7 +99,10 @@ __all__ = [
     "read_transitions",
     "render_lab",
     "select",
+    "show_frame",
+    "show_words",
     "smoothing",
+    "stability",
     "tokenize",
     "train_dictionary",
     "train_lm",

@@ -3,11 +3,12 @@
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from placerec.evaluation import (
     Evaluation,
@@ -21,6 +22,8 @@ from placerec.evaluation import (
     table,
 )
 from placerec.evaluation.sheet import contact_sheet
+from placerec.evaluation.word_sheet import draw_word_sheet
+from placerec.evaluation.word_table import WordTable, typical_paths, word_sentences, word_table
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import find_sequences
@@ -28,7 +31,7 @@ from placerec.hohmm import Beliefs, write_beliefs
 from placerec.lab import render_lab
 from placerec.lm.inspection import format_inspection, inspect_model
 from placerec.model import Options, load_recognizer, read_corpus, train_model
-from placerec.vision import Dictionary, describe
+from placerec.vision import Descriptors, Dictionary, describe
 from placerec.words import read_stream
 from placerec.words.tokenize import tokens_of, write_tokens
 
@@ -76,8 +79,13 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
                 results.append(DemoResult(smoothing, order, evaluate(beliefs)))
                 best = beliefs if (smoothing, order) == ("witten-bell", 2) else best
         contact_sheet(_typical_frames(sequences), folder / "laboratory.png")
+        words = word_table(_only(descriptors, ~training), dictionary)
+        draw_word_sheet(words, typical_paths(words, sequences), folder / "words.png", title="The words of run 3")
         plot_evaluation(best, evaluate(best), folder / "beliefs.png")
-        write_text(folder / "report.html", _report(folder, results, len(descriptors.frames), _commands(scale, seed)))
+        write_text(
+            folder / "report.html",
+            _report(folder, results, words, len(descriptors.frames), _commands(scale, seed)),
+        )
     return results
 
 
@@ -99,6 +107,16 @@ def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
     for found in beliefs:
         write_beliefs(folder / "beliefs" / f"{smoothing}-{order}" / f"{found.name}.tsv", found)
     return beliefs
+
+
+def _only(descriptors: Descriptors, rows: NDArray[np.bool_]) -> Descriptors:
+    """The descriptors of some frames."""
+    kept = np.flatnonzero(rows).tolist()
+    frames, sequences, places = (
+        tuple(names[row] for row in kept) for names in (descriptors.frames, descriptors.sequences, descriptors.places)
+    )
+    values, times = descriptors.values[rows], descriptors.times[rows]
+    return replace(descriptors, values=values, times=times, frames=frames, sequences=sequences, places=places)
 
 
 def format_results(results: Sequence[DemoResult]) -> str:
@@ -128,7 +146,7 @@ def _typical_frames(sequences: Sequence[FrameSequence]) -> dict[str, dict[str, P
     return sheet
 
 
-def _report(folder: Path, results: Sequence[DemoResult], frames: int, commands: str) -> str:
+def _report(folder: Path, results: Sequence[DemoResult], words: WordTable, frames: int, commands: str) -> str:
     body = [
         paragraph(
             f"A camera was driven through a small office laboratory: {frames} frames in 18 sequences. The laboratory "
@@ -141,6 +159,13 @@ def _report(folder: Path, results: Sequence[DemoResult], frames: int, commands: 
             folder / "laboratory.png",
             "Frames of five places in three illuminations",
             "What the camera sees, by place and light. Synthetic.",
+        ),
+        heading("The words"),
+        paragraph(" ".join(word_sentences(words))),
+        picture(
+            folder / "words.png",
+            "For each of the 100 words a typical frame, framed in the colour of its place",
+            "What the words look like in the six synthetic test sequences, as `placerec show-words` draws it.",
         ),
         heading("Frames recognised"),
         _results_table(results),
@@ -209,6 +234,7 @@ def _commands(scale: str, seed: int) -> str:
         [
             f"placerec lab lab/ --scale {scale} --seed {seed}",
             f"placerec train-words lab/seq*[12] -o words.npz --seed {seed}",
+            "placerec show-words words.npz lab/seq*3 -o words.png",
             "placerec tokenize lab/ -w words.npz -o tokens/",
             "placerec train-lm tokens/*[12].tsv -o model/ --order 2",
             "placerec decode tokens/*3.tsv -m model/ -o beliefs/",

@@ -15,7 +15,10 @@ from placerec.cli.describe import describe
 from placerec.cli.evaluate import evaluate
 from placerec.cli.inspect import inspect
 from placerec.cli.lab import lab
+from placerec.cli.show_frame import show_frame
+from placerec.cli.show_words import show_words
 from placerec.cli.srilm import SRILM_COMMANDS
+from placerec.cli.stability import stability
 from placerec.cli.tokenize import tokenize
 from placerec.cli.train_lm import train_lm
 from placerec.cli.train_words import train_words
@@ -84,6 +87,8 @@ for command in (
     lab,
     demo,
 ):
+    commands.add_command(command)
+for command in (show_words, show_frame, stability):
     commands.add_command(command)
 for tool in SRILM_COMMANDS:
     commands.add_command(tool)

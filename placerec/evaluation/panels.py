@@ -58,14 +58,11 @@ def figure_file(path: Path | str, width: float, height: float) -> "Iterator[Figu
     suffix or a path that cannot be written, MissingExtraError without matplotlib.
     """
     path = Path(path)
-    if path.suffix.lower() not in _METADATA:
-        raise OutputError(f"{path}: no kind of picture; let its name end in .png, .svg or .pdf")
-    try:
-        import matplotlib
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingExtraError("matplotlib", "a picture", "pip install 'placerec[plot]'") from error
+    check_figure(path)
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams["svg.hashsalt"] = "placerec"
@@ -78,6 +75,16 @@ def figure_file(path: Path | str, width: float, height: float) -> "Iterator[Figu
             figure.savefig(partial, dpi=_DPI, metadata=_METADATA[path.suffix.lower()])
 
 
+def check_figure(path: Path | str) -> None:
+    """Raise what `figure_file` would, of suffix and matplotlib: before an hour of work, and not after it."""
+    if Path(path).suffix.lower() not in _METADATA:
+        raise OutputError(f"{path}: no kind of picture; let its name end in .png, .svg or .pdf")
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError as error:
+        raise MissingExtraError("matplotlib", "a picture", "pip install 'placerec[plot]'") from error
+
+
 def place_colours(places: Sequence[str]) -> NDArray[np.float64]:
     """A colour for each of n places, (n, 3) red, green, blue from 0 to 1; from the thirteenth on they get darker.
 
@@ -88,6 +95,11 @@ def place_colours(places: Sequence[str]) -> NDArray[np.float64]:
     colours: NDArray[np.float64] = base[index % len(base)] * 0.6 ** (index // len(base))[:, None]
     colours[[place == UNKNOWN for place in places]] = _GREY
     return colours
+
+
+def letter_colour(ground: NDArray[np.float64]) -> str:
+    """Black or white, whichever is read better on a colour (3,) of red, green, blue."""
+    return "black" if ground @ (0.299, 0.587, 0.114) > 0.45 else "white"
 
 
 def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None = None, title: str = "") -> None:
@@ -196,11 +208,11 @@ def _name_visits(axes: "Axes", truth: NDArray[np.int64], places: Sequence[str]) 
     font = 6.5
     room = _inches(axes) * 72 / len(truth)
     starts = np.concatenate(([0], np.flatnonzero(np.diff(truth)) + 1))
-    luminance = place_colours(places) @ (0.299, 0.587, 0.114)
+    colours = place_colours(places)
     for start, end in zip(starts, [*starts[1:], len(truth)], strict=True):
         place = int(truth[start])
         if place >= 0 and (end - start) * room > _LETTER * font * (len(places[place]) + 1):
-            colour = "black" if luminance[place] > 0.45 else "white"
+            colour = letter_colour(colours[place])
             spot = ((start + end) / 2, sum(_TRUE) / 2 - 0.02)
             axes.text(*spot, places[place], ha="center", va="center", fontsize=font, color=colour)
 

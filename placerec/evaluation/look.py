@@ -1,0 +1,107 @@
+"""The commands that look at words: sources in, tables and pictures out."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from placerec.evaluation.frame_sheet import draw_frame_sheet
+from placerec.evaluation.frame_view import FrameView, view_frame
+from placerec.evaluation.panels import check_figure
+from placerec.evaluation.word_sheet import draw_word_sheet
+from placerec.evaluation.word_stability import plot_stability
+from placerec.evaluation.word_table import WordTable, typical_paths, word_table
+from placerec.files import whole_file
+from placerec.frames import find_sequences
+from placerec.vision import Dictionary, describe
+from placerec.vision.stability import Stability, word_changes
+
+Progress = Callable[[int, int], None]
+
+
+def show_words(
+    words: Path | str,
+    sources: Iterable[Path | str],
+    out: Path | str | None = None,
+    *,
+    format: str = "auto",
+    progress: Progress | None = None,
+) -> WordTable:
+    """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
+
+    `out`: the picture to draw, PNG, SVG or PDF by suffix. Raises what `find_sequences`, `describe` and
+    `draw_word_sheet` raise.
+    """
+    dictionary = Dictionary.load(words)
+    with _picture(out) as picture:
+        table, typical = _looked_up(sources, dictionary, format, progress)
+        if picture is not None:
+            draw_word_sheet(table, typical, picture, title=f"The words of {Path(words).name}")
+    return table
+
+
+def show_frame(
+    image: Path | str,
+    words: Path | str,
+    sources: Iterable[Path | str] = (),
+    out: Path | str | None = None,
+    *,
+    format: str = "auto",
+    progress: Progress | None = None,
+) -> FrameView:
+    """`placerec show-frame`: what a words.npz sees in an image, and which units are nearest to it.
+
+    `sources`: sequences whose frames tell what the units look like and which places they belong to. `out`: the
+    picture to draw. Raises as `show_words` does, and SourceError or VisionError for an image that cannot be used.
+    """
+    dictionary = Dictionary.load(words)
+    view = view_frame(image, dictionary)
+    with _picture(out) as picture:
+        typical: list[Path | None] = [None] * len(view.words)
+        if sources := list(sources):
+            table, typical = _looked_up(sources, dictionary, format, progress)
+            view = replace(view, table=table)
+        if picture is not None:
+            draw_frame_sheet(view, typical, picture)
+    return view
+
+
+def stability(
+    sources: Iterable[Path | str],
+    words: Path | str,
+    out: Path | str | None = None,
+    *,
+    format: str = "auto",
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Stability:
+    """`placerec stability`: how many frames of the sources get another word by what a camera does to pictures.
+
+    `out`: the picture to draw. `seed`: of the noise. Raises as `show_words` does.
+    """
+    dictionary = Dictionary.load(words)
+    with _picture(out) as picture:
+        found = word_changes(find_sequences(sources, format=format), dictionary, seed=seed, progress=progress)
+        if picture is not None:
+            plot_stability(found, picture)
+    return found
+
+
+def _looked_up(
+    sources: Iterable[Path | str], dictionary: Dictionary, format: str, progress: Progress | None
+) -> tuple[WordTable, list[Path | None]]:
+    """The table of the sources' frames, and the image file of every unit's typical frame."""
+    sequences = find_sequences(sources, format=format)
+    table = word_table(describe(sequences, dictionary.spec, progress=progress), dictionary)
+    return table, typical_paths(table, sequences)
+
+
+@contextmanager
+def _picture(out: Path | str | None) -> Iterator[Path | None]:
+    """Where to draw, if anything is to be drawn; that it cannot be written is found out before the work."""
+    if out is None:
+        yield None
+        return
+    check_figure(out)
+    with whole_file(Path(out)) as partial:
+        yield partial

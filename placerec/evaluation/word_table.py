@@ -1,0 +1,197 @@
+"""What the words of a dictionary look like and stand for, among the frames of some sequences: a row per unit."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.evaluation.metrics import codes
+from placerec.evaluation.summary import percent, shorten
+from placerec.frames import Sequence
+from placerec.vision import Descriptors, Dictionary
+from placerec.vision.pca import project
+from placerec.vision.som import best_units
+
+_NAME_WIDTH = 32
+
+
+@dataclass(frozen=True, eq=False)
+class WordTable:
+    """K units of a map of size x size, row-major, and the n frames that were looked at.
+
+    hits: frames that trained the unit (K,). frames: those looked at whose word it is (K,). votes: of these, how many
+    of each place, (K, P). typical: the nearest of these to the unit, (K,), -1 where there is none; distances: how far
+    it is, nan where there is none. u_matrix (K,). to_dead: frames of the n whose nearest unit of all is one that no
+    training frame hit, whether or not such units may be words (`units`).
+    """
+
+    words: tuple[str, ...]
+    size: int
+    units: str
+    hits: NDArray[np.int64]
+    frames: NDArray[np.int64]
+    places: tuple[str, ...]
+    votes: NDArray[np.int64]
+    typical: NDArray[np.int64]
+    distances: NDArray[np.float32]
+    u_matrix: NDArray[np.float64]
+    to_dead: int
+    is_training: bool  # the frames look like those that trained the map: as many of them hit each unit
+    sequence_names: tuple[str, ...]  # (n,) of every frame
+    frame_names: tuple[str, ...]
+
+    @property
+    def place(self) -> NDArray[np.int64]:
+        """The place that most frames of a word have, (K,): index in places, -1 where no frame has a label."""
+        if not self.places:
+            return np.full(len(self.words), -1)
+        return np.where(self.votes.any(axis=1), self.votes.argmax(axis=1), -1)
+
+    @property
+    def share(self) -> NDArray[np.float64]:
+        """The share of that place among the word's labelled frames, (K,), nan where no frame has a label."""
+        most, labelled = self.votes.max(axis=1, initial=0), self.votes.sum(axis=1)
+        share: NDArray[np.float64] = np.where(labelled > 0, most / np.maximum(labelled, 1), np.nan)
+        return share
+
+    def to_json(self) -> dict[str, object]:
+        """The object that `show-words --json` prints: None where there is no frame or no label."""
+        labelled = int(self.votes.sum())
+        return {
+            "frames": len(self.frame_names),
+            "sequences": len(set(self.sequence_names)),
+            "labelled": labelled,
+            "to_dead_units": self.to_dead,
+            "in_majority_place": self.agreeing / labelled if labelled else None,
+            "places": list(self.places),
+            "units": [self.row(unit) for unit in range(len(self.words))],
+        }
+
+    def row(self, unit: int) -> dict[str, object]:
+        """One unit, as plain Python values."""
+        place, frame = int(self.place[unit]), int(self.typical[unit])
+        found, labelled = frame >= 0, place >= 0
+        return {
+            "unit": unit,
+            "word": self.words[unit],
+            "hits": int(self.hits[unit]),
+            "u_matrix": round(float(self.u_matrix[unit]), 6),
+            "frames": int(self.frames[unit]),
+            "place": self.places[place] if labelled else None,
+            "share": round(float(self.share[unit]), 6) if labelled else None,
+            "typical_sequence": self.sequence_names[frame] if found else None,
+            "typical_frame": self.frame_names[frame] if found else None,
+            "distance": round(float(self.distances[unit]), 6) if found else None,
+        }
+
+    @property
+    def agreeing(self) -> int:
+        """Labelled frames whose place is the one that their word mostly belongs to."""
+        return int(self.votes.max(axis=1, initial=0).sum())
+
+
+def word_table(descriptors: Descriptors, dictionary: Dictionary) -> WordTable:
+    """Look up the word of every frame, and what can be said of every unit."""
+    count = len(dictionary.codebook)
+    units, distances = dictionary.words(descriptors.values)
+    nearest, _ = best_units(project(descriptors.values, dictionary.pca), dictionary.codebook)
+    places = tuple(sorted(set(descriptors.places) - {""}))
+    place = codes(descriptors.places, places)
+    labelled = place >= 0
+    votes = np.bincount(units[labelled] * len(places) + place[labelled], minlength=count * len(places))
+    # Sorted by unit and distance, the first row of each unit is its nearest.
+    order = np.lexsort((distances, units))
+    starts = np.flatnonzero(np.diff(units[order], prepend=-1))
+    typical, least = np.full(count, -1), np.full(count, np.nan, np.float32)
+    typical[units[order[starts]]] = order[starts]
+    least[units[order[starts]]] = distances[order[starts]]
+    return WordTable(
+        dictionary.vocabulary,
+        dictionary.training.size,
+        dictionary.training.units,
+        dictionary.hits,
+        np.bincount(units, minlength=count),
+        places,
+        votes.reshape(count, len(places)),
+        typical,
+        least,
+        u_matrix(dictionary.codebook).ravel(),
+        int((dictionary.hits[nearest] == 0).sum()),
+        np.array_equal(np.bincount(nearest, minlength=count), dictionary.hits),
+        descriptors.sequences,
+        descriptors.frames,
+    )
+
+
+def typical_paths(table: WordTable, sequences: Iterable[Sequence]) -> list[Path | None]:
+    """The image file of every unit's typical frame, None where it has none; `sequences` are those looked at."""
+    path = {(sequence.name, frame.name): frame.path for sequence in sequences for frame in sequence.frames}
+    chosen = table.typical.tolist()
+    return [None if i < 0 else path[table.sequence_names[i], table.frame_names[i]] for i in chosen]
+
+
+def u_matrix(codebook: NDArray[np.float32]) -> NDArray[np.float64]:
+    """The mean distance of every unit to the units above, below, left and right of it, (size, size)."""
+    size = round(len(codebook) ** 0.5)
+    lattice = codebook.astype(np.float64).reshape(size, size, -1)
+    total, neighbours = np.zeros((size, size)), np.zeros((size, size))
+    down = np.sqrt(np.square(np.diff(lattice, axis=0)).sum(axis=2))
+    right = np.sqrt(np.square(np.diff(lattice, axis=1)).sum(axis=2))
+    for part, between in ((np.s_[:-1], down), (np.s_[1:], down), (np.s_[:, :-1], right), (np.s_[:, 1:], right)):
+        total[part] += between
+        neighbours[part] += 1
+    return total / np.maximum(neighbours, 1)
+
+
+def word_sentences(table: WordTable) -> list[str]:
+    """What there is to say of the words in general, in a few sentences."""
+    frames, sequences = len(table.frame_names), len(set(table.sequence_names))
+    live = int((table.hits > 0).sum())
+    seen = int((table.frames > 0).sum())
+    which = "all" if live == len(table.words) else str(live)
+    told = [
+        f"{len(table.words)} units, {which} of them hit in training; {seen} are words of "
+        f"{_some(frames, 'frame')} in {_some(sequences, 'sequence')}."
+    ]
+    if live < len(table.words):
+        told.append(_dead_sentence(table))
+    labelled = int(table.votes.sum())
+    if labelled:
+        told.append(
+            f"{percent(table.agreeing / labelled)} of the {_some(labelled, 'labelled frame')} have the place that "
+            "their word mostly belongs to (counted on these very frames)."
+        )
+    else:
+        told.append("No frame has a label: it is not known which place a word belongs to.")
+    return told
+
+
+def format_words(table: WordTable) -> str:
+    """The sentences, and a line per place: its frames, its words, and how many of its frames have one of these."""
+    lines = word_sentences(table)
+    if table.places:
+        width = max(5, *(len(shorten(place, _NAME_WIDTH)) for place in table.places))
+        lines += ["", f"{'place':<{width}}  {'frames':>8}  {'words':>6}  {'its frames with these words':>28}"]
+    for number, place in enumerate(table.places):
+        mine = table.place == number
+        frames = int(table.votes[:, number].sum())
+        share = percent(int(table.votes[mine, number].sum()) / frames)
+        lines.append(f"{shorten(place, _NAME_WIDTH):<{width}}  {frames:>8}  {int(mine.sum()):>6}  {share:>28}")
+    return "\n".join(lines)
+
+
+def _dead_sentence(table: WordTable) -> str:
+    dead = int((table.hits == 0).sum())
+    what = f"{_some(dead, 'unit')} that no training frame hit"
+    if not table.to_dead:
+        return f"{what}: none of these frames is nearest to one{', for they trained the map' * table.is_training}."
+    reach = f"{percent(table.to_dead / len(table.frame_names))} of the frames"
+    if table.units == "live":
+        return f"{what}: {reach} are nearest to one, and get the word of the nearest live unit instead."
+    return f"{what}: {reach} are nearest to one and have it as word, which no language model has seen."
+
+
+def _some(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -1,0 +1,86 @@
+"""The commands that look at words, as a user meets them."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from small import write_images
+
+from placerec.cli import commands
+from placerec.vision import DescriptorSpec, train_dictionary
+from placerec.vision.stability import CHANGES
+
+
+def placerec(*args: object) -> Result:
+    return CliRunner().invoke(commands, [str(arg) for arg in args], prog_name="placerec")
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("world")
+    for seed, name in enumerate(("seq1", "seq2")):
+        write_images(root / "runs" / name, seed)
+    train_dictionary([root / "runs/seq1"], root / "words.npz", spec=DescriptorSpec(image_size=16), size=3)
+    return root
+
+
+def image(world: Path) -> Path:
+    return min((world / "runs/seq1/std_cam").iterdir())
+
+
+def test_show_words(world: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    told = placerec("show-words", world / "words.npz", world / "runs", "-o", tmp_path / "words.png")
+    assert told.exit_code == 0, told.output
+    assert (tmp_path / "words.png").read_bytes().startswith(b"\x89PNG")
+    assert told.stdout.startswith("9 units, ")
+    assert " 24 frames in 2 sequences.\n" in told.stdout
+    found = json.loads(placerec("show-words", world / "words.npz", world / "runs", "--json", "-q").stdout)
+    assert len(found["units"]) == 9
+    assert found["places"] == ["hall", "kitchen"]
+    assert sum(unit["frames"] for unit in found["units"]) == 24
+
+
+def test_show_frame(world: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    words = ("-w", world / "words.npz")
+    told = placerec("show-frame", image(world), *words, "-o", tmp_path / "seen.svg")
+    assert told.exit_code == 0, told.output
+    assert (tmp_path / "seen.svg").read_bytes().startswith(b"<?xml")
+    word = told.stdout.split(": ")[1].split(",")[0]
+    found = json.loads(placerec("show-frame", image(world), world / "runs", *words, "--json", "-q").stdout)
+    assert found["word"] == word
+    assert len(found["nearest"]) == 5
+    assert {"place", "typical_frame", "distance"} <= set(found["nearest"][0])
+
+
+def test_stability(world: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    args = ("stability", world / "runs/seq2", "-w", world / "words.npz")
+    told = placerec(*args, "-o", tmp_path / "bars.pdf")
+    assert told.exit_code == 0, told.output
+    assert (tmp_path / "bars.pdf").read_bytes().startswith(b"%PDF")
+    assert len(told.stdout.splitlines()) == 3 + len(CHANGES)
+    found = json.loads(placerec(*args, "--json").stdout)
+    assert found["frames"] == 12
+    assert [change["kind"] for change in found["changes"]] == [change.kind for change in CHANGES]
+    assert placerec(*args).stdout == told.stdout
+
+
+@pytest.mark.parametrize("command", ["show-words", "show-frame", "stability"])
+def test_errors_are_one_line(world: Path, tmp_path: Path, command: str) -> None:
+    given: dict[str, list[object]] = {
+        "show-words": [world / "words.npz", world / "runs"],
+        "show-frame": [image(world), "-w", world / "words.npz"],
+        "stability": [world / "runs", "-w", world / "words.npz"],
+    }
+    broken = placerec(command, *given[command], "-o", tmp_path / "a.bmp")
+    assert broken.exit_code == 1
+    assert (
+        broken.stderr == f"placerec: {tmp_path / 'a.bmp'}: no kind of picture; let its name end in .png, .svg or .pdf\n"
+    )
+    missing = [world / "no.npz" if arg == world / "words.npz" else arg for arg in given[command]]
+    broken = placerec(command, *missing)
+    assert broken.exit_code == 1
+    assert broken.stderr == f"placerec: {world / 'no.npz'}: no such file; name another\n"

@@ -1,0 +1,157 @@
+"""How stable words are: the changes themselves, and the counts against a plain loop."""
+
+import logging
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from small import write_images
+
+from placerec.errors import VisionError
+from placerec.frames import Sequence, find_sequences, read_gray
+from placerec.vision import DescriptorSpec, Dictionary, describe, descriptor, fit_image, stability
+from placerec.vision.images import Gray
+from placerec.vision.stability import CHANGES, Change, Stability, word_changes
+
+SPEC = DescriptorSpec(image_size=16)
+World = tuple[list[Sequence], Dictionary]
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> World:
+    root = tmp_path_factory.mktemp("world")
+    for seed, name in enumerate(("seq1", "seq2")):
+        write_images(root / name, seed, 10)
+    sequences = find_sequences([root])
+    return sequences, Dictionary.fit(describe(sequences, SPEC).values, spec=SPEC, size=4)
+
+
+def change(kind: str, amount: str) -> Change:
+    return next(each for each in CHANGES if (each.kind, each.amount) == (kind, amount))
+
+
+def spoilt(gray: Gray, kind: str, amount: str, spec: DescriptorSpec = SPEC) -> Gray:
+    return change(kind, amount).apply(gray, spec, np.random.Generator(np.random.PCG64(0)))
+
+
+def picture(dtype: type = np.uint8, height: int = 48, width: int = 64) -> NDArray[np.uint8 | np.float32]:
+    smooth = cv2.GaussianBlur(np.random.default_rng(0).random((height, width)), (0, 0), 2)
+    low, high = smooth.min(), smooth.max()
+    gray: NDArray[np.uint8 | np.float32] = (20 + 200 * (smooth - low) / (high - low)).astype(dtype)
+    return gray
+
+
+def test_the_counts_are_those_of_a_plain_loop(world: World) -> None:
+    sequences, dictionary = world
+    found = word_changes(sequences, dictionary, seed=3)
+    rows = [
+        [descriptor(gray, SPEC), *(descriptor(each.apply(gray, SPEC, rng), SPEC) for each in CHANGES)]
+        for number, frame in enumerate(frame for sequence in sequences for frame in sequence.frames)
+        for gray, rng in [(read_gray(frame.path), np.random.Generator(np.random.PCG64([3, number])))]
+    ]
+    words = [[int(dictionary.words(values[None])[0][0]) for values in row] for row in rows]
+
+    def counts(pairs: list[tuple[int, int]]) -> tuple[int, int]:
+        apart = [max(abs(a // 4 - b // 4), abs(a % 4 - b % 4)) for a, b in pairs]
+        return sum(distance > 0 for distance in apart), sum(distance == 1 for distance in apart)
+
+    assert (found.frames, found.steps) == (20, 18)
+    for column, result in enumerate(found.results, start=1):
+        assert (result.kind, result.amount) == (CHANGES[column - 1].kind, CHANGES[column - 1].amount)
+        assert (result.changed, result.neighbour) == counts([(row[0], row[column]) for row in words])
+    steps = [(words[i][0], words[i + 1][0]) for i in range(19) if i != 9]
+    assert (found.step_changed, found.step_neighbour) == counts(steps)
+    assert sum(result.changed for result in found.results) > 0
+
+
+def test_the_same_seed_gives_the_same_counts_in_pieces_of_any_size(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = word_changes(*world)
+    told: list[tuple[int, int]] = []
+    monkeypatch.setattr(stability, "_CHUNK", 3)
+    assert word_changes(*world, progress=lambda *done: told.append(done)) == whole
+    assert told == [(done, 20) for done in range(1, 21)]
+
+
+def test_an_image_that_cannot_be_read_is_skipped_and_named(
+    world: World, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    bad = next((write_images(tmp_path / "seq", frames=4) / "std_cam").iterdir())
+    bad.write_text("no picture")
+    with caplog.at_level(logging.WARNING, "placerec"):
+        found = word_changes(find_sequences([tmp_path / "seq"]), world[1])
+    assert found.frames == 3
+    assert f"{bad}: is no image that OpenCV can decode" in caplog.text
+    for path in (tmp_path / "seq/std_cam").iterdir():
+        path.write_text("no picture")
+    with pytest.raises(VisionError, match="none of the 4 images can be read"):
+        word_changes(find_sequences([tmp_path / "seq"]), world[1])
+
+
+def test_json_has_shares() -> None:
+    found = Stability(4, (stability.ChangeResult("noise", "sigma 2", 2, 1),), 0, 0, 0)
+    assert found.to_json() == {
+        "frames": 4,
+        "changes": [{"kind": "noise", "amount": "sigma 2", "changed": 0.5, "to_neighbour": 0.25}],
+        "next_frame": {"steps": 0, "changed": None, "to_neighbour": None},
+    }
+
+
+# The changes
+
+
+@pytest.mark.parametrize("each", CHANGES, ids=lambda each: f"{each.kind} {each.amount}")
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_a_changed_picture_is_a_picture_of_its_kind(each: Change, dtype: type) -> None:
+    gray = picture(dtype)
+    before = gray.copy()
+    changed = each.apply(gray, SPEC, np.random.Generator(np.random.PCG64(0)))
+    np.testing.assert_array_equal(gray, before)
+    assert changed.dtype == (np.uint8 if each.kind == "JPEG" else dtype)
+    assert changed.shape == ((16, 16) if each.kind == "resize filter" else gray.shape)
+    assert 0 <= changed.min() <= changed.max() <= 255
+    if changed.shape == gray.shape:
+        assert not np.array_equal(changed, gray)
+
+
+def test_brightness_is_a_factor_and_stays_within_white() -> None:
+    gray = np.tile(np.array([0, 10, 100, 250], np.uint8), (8, 2))
+    assert spoilt(gray, "brightness", "+30 %")[0, :4].tolist() == [0, 13, 130, 255]
+    assert spoilt(gray, "brightness", "-10 %")[0, :4].tolist() == [0, 9, 90, 225]
+
+
+def test_noise_has_the_deviation_that_it_says() -> None:
+    gray = np.full((100, 100), 128, np.float32)
+    for sigma in (2, 5, 10):
+        assert spoilt(gray, "noise", f"sigma {sigma}").std() == pytest.approx(sigma, rel=0.03)
+
+
+@pytest.mark.parametrize(("way", "row", "column"), [("left", 0, -1), ("right", 0, 1), ("up", -1, 0), ("down", 1, 0)])
+def test_a_shift_moves_the_picture_by_a_pixel_and_repeats_the_edge(way: str, row: int, column: int) -> None:
+    gray = np.zeros((9, 9), np.uint8)
+    gray[4, 4], gray[0, 0], gray[8, 8] = 200, 7, 9
+    moved = spoilt(gray, "shift by 1 pixel", way)
+    assert moved[4 + row, 4 + column] == 200
+    assert (moved == 200).sum() == 1
+    assert (moved == (9 if row + column < 0 else 7)).sum() == 2
+
+
+def test_less_quality_is_farther_from_the_picture() -> None:
+    gray = picture().astype(np.uint8)
+    errors = [np.abs(spoilt(gray, "JPEG", f"quality {q}").astype(int) - gray).mean() for q in (90, 70, 50, 30)]
+    assert errors == sorted(errors)
+    assert 0 < errors[0] < errors[-1]
+
+
+@pytest.mark.parametrize("fit", ["squash", "crop"])
+def test_another_filter_keeps_the_way_of_fitting(fit: str) -> None:
+    gray = picture(np.float32, 60, 90)
+    spec = DescriptorSpec(image_size=20, fit=fit)
+    rng = np.random.Generator(np.random.PCG64(0))
+    with_ours = stability._resized(gray, spec, rng, interpolation=cv2.INTER_AREA)
+    np.testing.assert_allclose(with_ours, fit_image(gray, 20, fit), atol=1e-3)
+    for name in ("nearest", "bicubic"):
+        assert not np.array_equal(spoilt(gray, "resize filter", name, spec), with_ours)
