@@ -205,3 +205,55 @@ def output_option(metavar: str, text: str, required: bool = True) -> Callable[[C
 def json_option(text: str = "Print JSON.") -> Callable[[Command], Command]:
     """--json: output for programs."""
     return click.option("--json", "as_json", is_flag=True, help=text)
+
+
+_DECODING = (
+    click.option(
+        "--transition",
+        metavar="fixed|learned|FILE",
+        default="fixed",
+        show_default=True,
+        help="How the place changes: --stay, as the training counted it, or a table of probabilities.",
+    ),
+    click.option(
+        "--stay", type=FiniteRange(0, 1), help="Probability of staying in a place for one step.  [default: 0.99]"
+    ),
+    click.option(
+        "--per",
+        type=click.Choice(["update", "frame", "second"]),
+        help="What one step is: a selected word, a frame, a second.  [default: update]",
+    ),
+    click.option(
+        "--max-gap",
+        metavar="SECONDS",
+        type=FiniteRange(0, min_open=True),
+        help="More time than this between two frames begins a new sequence.",
+    ),
+    click.option("--smooth", is_flag=True, help="Let all words of a sequence count for every frame."),
+    click.option(
+        "--lag", metavar="N", type=click.IntRange(0), help="Let the words up to N frames later count for each frame."
+    ),
+)
+_DECODING_NAMES = ("transition", "stay", "per", "max_gap", "smooth", "lag")
+
+
+def decoding_options(*more: str) -> Callable[[Command], Command]:
+    """What beliefs depend on: --transition, --stay, --per, --max-gap, --smooth, --lag. The command gets `options`.
+
+    `more`: flags of the command's own that are fields of `Decoding`, too.
+    """
+
+    def decorated(function: Command) -> Command:
+        @functools.wraps(function)
+        def decoding(*args: Any, **options: Any) -> Any:
+            from placerec.model import Decoding
+
+            try:
+                chosen = Decoding(**{name: options.pop(name) for name in (*_DECODING_NAMES, *more)})
+            except PlacerecError as error:
+                raise click.UsageError(str(error)) from error
+            return function(*args, options=chosen, **options)
+
+        return functools.reduce(lambda command, option: option(command), reversed(_DECODING), decoding)
+
+    return decorated

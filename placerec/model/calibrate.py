@@ -13,31 +13,32 @@ from placerec.files import held_folder, write_text
 from placerec.hohmm import Beliefs
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.unknown import measure_distances
-from placerec.model.decode import _token_streams
-from placerec.model.load import PlaceModels, load_model, make_recognizer
+from placerec.model.decoding import PAPER, Decoding, describe_decoding
+from placerec.model.load import PlaceModels, load_model
+from placerec.model.recognize import make_recognizer, token_streams
 from placerec.model.train import MODEL_JSON, format_description
 from placerec.words import WordStream
 
 log = logging.getLogger(__name__)
 
 
-def calibrate(model: Path | str, tokens: Sequence[Path | str], *, stay: float = 0.99) -> Calibration:
+def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decoding = PAPER) -> Calibration:
     """`placerec calibrate`: fit a temperature to the beliefs in labelled `tokens`, and keep it in model.json.
 
-    `stay`: as for `decode`; the calibration holds for decoding with the same. Frames without a label, and those of
+    `options`: as for `decode`; the calibration holds for decoding with the same. Frames without a label, and those of
     places that the model does not know, are left out and counted. Raises ModelError for sequences that trained the
     model, and if no frame is left; model.json is then as it was.
     """
     path = Path(model)
     with held_folder(path) if path.is_dir() else nullcontext():
         models = load_model(path)
-        streams = _token_streams(tokens, models)
+        streams = token_streams(tokens, models)
         _refuse_training(models, streams)
-        calibration = fit_calibration(*_judged(models, _decoded(models, streams, stay)))
+        calibration = fit_calibration(*_judged(models, _decoded(models, streams, options)))
         found = {
             **calibration.to_json(),
             "distances": _measured(models, streams),
-            "options": {"stay": stay},
+            "options": describe_decoding(models, options),
             "sequences": [stream.name for stream in streams],
         }
         write_text(path / MODEL_JSON, format_description({**models.description, "calibration": found}))
@@ -56,9 +57,9 @@ def _refuse_training(models: PlaceModels, streams: Sequence[WordStream]) -> None
             )
 
 
-def _decoded(models: PlaceModels, streams: Sequence[WordStream], stay: float) -> list[Beliefs]:
-    recognizer = make_recognizer(models, stay=stay)
-    return [recognizer.decode(stream) for stream in streams]
+def _decoded(models: PlaceModels, streams: Sequence[WordStream], options: Decoding) -> list[Beliefs]:
+    recognizer = make_recognizer(models, options=options)
+    return [recognizer.decode(stream, smooth=options.smooth, lag=options.lag) for stream in streams]
 
 
 def _judged(models: PlaceModels, decoded: Sequence[Beliefs]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -9,10 +9,10 @@ from pathlib import Path
 from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
 from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, format_row
-from placerec.model.corpus import STREAM_SUFFIXES, dictionary_of, read_streams, stream_files
+from placerec.model.corpus import STREAM_SUFFIXES
 from placerec.model.decoding import PAPER, Decoding
 from placerec.model.load import PlaceModels, load_model
-from placerec.model.recognize import make_recognizer
+from placerec.model.recognize import make_recognizer, token_streams
 from placerec.words import WordStream
 
 OWNED = ("*.tsv", "*.jsonl")
@@ -42,7 +42,7 @@ def decode(
         models = load_model(model)
         if words is None:
             recognizer = make_recognizer(models, options=options, scorer=scorer)
-            streams = _token_streams(sources, models)
+            streams = token_streams(sources, models)
         else:
             recognizer, streams = _image_streams(sources, Path(words), models, format, options, scorer, progress)
         if out is None and len(streams) > 1:
@@ -60,16 +60,6 @@ def decode(
             write_text(folder / f"{beliefs.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
     log.info("%s: %d sequences, %d frames", out, len(found), sum(len(beliefs.frames) for beliefs in found))
     return found
-
-
-def _token_streams(sources: Sequence[Path | str], models: PlaceModels) -> list[WordStream]:
-    made_by, trained_on = dictionary_of(stream_files(sources)), models.description["dictionary"]
-    if made_by and trained_on and made_by.fingerprint != trained_on:
-        raise StreamError(
-            f"{made_by.folder}: its words are of another dictionary than those that trained {models.path}; "
-            "tokenize with the words.npz of the training"
-        )
-    return read_streams(sources)
 
 
 def _image_streams(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from placerec.errors import ModelError
 from placerec.hohmm import Transition, fixed_transition, learned_transition, read_transitions
@@ -9,6 +10,7 @@ from placerec.model.load import PlaceModels
 from placerec.model.record import read_record
 
 STAY, PER = 0.99, "update"
+NAMED = ("fixed", "learned")
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Decoding:
     def __post_init__(self) -> None:
         if self.transition == "learned" and (self.stay is not None or self.per is not None):
             raise ModelError("learned transitions are per frame: they take neither a stay probability nor `per`")
-        if self.transition not in ("fixed", "learned"):
+        if self.transition not in NAMED:
             if self.stay is not None:
                 raise ModelError(f"{self.transition}: transitions of a file take no stay probability")
             if self.per == "second":
@@ -79,3 +81,20 @@ def transition_of(model: PlaceModels, options: Decoding) -> Transition:
     if not Path(options.transition).exists():
         raise ModelError(f"{options.transition}: no such file; transitions are fixed, learned, or a file")
     return Transition(read_transitions(options.transition, tuple(model.models)), per)
+
+
+def describe_decoding(model: PlaceModels, options: Decoding) -> dict[str, Any]:
+    """What the beliefs of `model` depend on, in plain values: the same for all ways to ask for the same.
+
+    A file of transitions stands there as its matrix, rows in the order of the places.
+    """
+    fixed = options.transition == "fixed"
+    transition = transition_of(model, options)
+    return {
+        "transition": options.transition if options.transition in NAMED else transition.matrix.tolist(),
+        "stay": (STAY if options.stay is None else options.stay) if fixed else None,
+        "per": transition.per,
+        "max_gap": options.max_gap,
+        "smooth": options.smooth,
+        "lag": options.lag,
+    }

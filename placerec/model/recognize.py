@@ -1,13 +1,16 @@
 """The recognizer of a MODEL/ folder."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from placerec.errors import ModelError
 from placerec.hohmm import Recognizer, SeparateEmissions
 from placerec.lm.external import kenlm_scorer
+from placerec.model.corpus import check_dictionary, read_streams, stream_files
 from placerec.model.decoding import PAPER, Decoding, transition_of
 from placerec.model.load import PlaceModels, load_model
+from placerec.words import WordStream
 
 if TYPE_CHECKING:
     from placerec.vision import Dictionary
@@ -53,6 +56,12 @@ def make_recognizer(
         max_gap=options.max_gap,
         emissions=_kenlm(model) if scorer == "kenlm" else None,
     )
+
+
+def token_streams(sources: Sequence[Path | str], model: PlaceModels) -> list[WordStream]:
+    """The token streams that `sources` name; StreamError if they are in other words than those of `model`."""
+    check_dictionary(stream_files(sources), model.description["dictionary"], model.path)
+    return read_streams(sources)
 
 
 def _kenlm(model: PlaceModels) -> SeparateEmissions:

@@ -13,9 +13,17 @@ from small import run_through, write_tokens
 from placerec.errors import ModelError, StreamError
 from placerec.evaluation import evaluate
 from placerec.hohmm import Calibration
-from placerec.model import calibrate, decode, load_model, train_lm
+from placerec.model import Decoding, calibrate, decode, load_model, train_lm
 from placerec.words import write_stream
 
+STAY_09 = {
+    "transition": "fixed",
+    "stay": 0.9,
+    "per": "update",
+    "max_gap": None,
+    "smooth": False,
+    "lag": None,
+}
 NAMES = tuple(f"run{number}" for number in range(1, 6))
 
 
@@ -34,13 +42,15 @@ def described(model: Path) -> dict[str, Any]:
 
 def test_the_temperature_is_kept_with_what_it_was_fitted_on(world: Path) -> None:
     before = described(world / "model")
-    found = calibrate(world / "model", [world / "tokens/run3.tsv", world / "tokens/run4.tsv"], stay=0.9)
+    found = calibrate(
+        world / "model", [world / "tokens/run3.tsv", world / "tokens/run4.tsv"], options=Decoding(stay=0.9)
+    )
     after = described(world / "model")
     kept = after.pop("calibration")
     before.pop("calibration", None)
     assert after == before
     assert Calibration.from_json(kept) == found
-    assert (kept["options"], kept["sequences"], kept["frames"]) == ({"stay": 0.9}, ["run3", "run4"], 120)
+    assert (kept["options"], kept["sequences"], kept["frames"]) == (STAY_09, ["run3", "run4"], 120)
     load_model(world / "model")
 
 
