@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 
 from placerec.errors import StreamError
 from placerec.words import WordStream, read_stream, read_vocabulary, write_stream, write_vocabulary
+from placerec.words.stream import RESERVED
 
 names = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=5).filter(
     lambda name: (
         not name.startswith(("##", "."))
         and not set(name) & set("/\\")
-        and name not in ("frame", "time", "place", "word", "distance", "selected", "best", "unknown", "-pau-")
+        and name not in ("frame", "time", "place", "word", "distance", "selected", "best", "unknown", *RESERVED)
     )
 )
 seconds = st.one_of(st.just(float("nan")), st.integers(0, 10**15).map(lambda microseconds: microseconds / 1e6))
