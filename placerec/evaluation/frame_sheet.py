@@ -112,8 +112,8 @@ def _roses(axes: "Axes", picture: NDArray[Any], energy: NDArray[np.float32], nam
 
 def _values(axes: "Axes", values: NDArray[np.float32]) -> None:
     """A descriptor whose values have no place in the picture, as bars."""
-    axes.bar(np.arange(len(values)), values, width=1.0, color=_ROSE)
-    axes.set_xlim(-0.5, len(values) - 0.5)
+    axes.stairs(values, fill=True, color=_ROSE)
+    axes.set_xlim(0, len(values))
     axes.set_title(f"The {len(values)} values of the descriptor", loc="left", fontsize=8.5)
     axes.set_yticks([0.0, float(values.max())], labels=["0", f"{values.max():.3g}"], fontsize=7)
     axes.spines[:].set_color("0.7")
