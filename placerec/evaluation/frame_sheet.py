@@ -51,7 +51,8 @@ def draw_frame_sheet(view: FrameView, typical: Sequence[Path | None], path: Path
         figure.text(_MARGIN / _WIDTH, 1 - 0.42 / height, title, fontsize=15)
         reading = _ROSES * edges + _BELOW
         figure.text(_MARGIN / _WIDTH, 1 - 0.7 / height, reading, fontsize=8.5, color="0.25")
-        _fitted(panel(_MARGIN, _HEAD), view.picture, "As the descriptor gets it", windows=edges)
+        how = "As the descriptor gets it" + ", in 4 x 4 windows" * edges
+        _fitted(panel(_MARGIN, _HEAD), view.picture, how, windows=edges)
         step = _PANEL + _GAP
         if edges:
             for scale, energy in enumerate(energies(view.values)):
