@@ -5,16 +5,32 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import FILE, json_option, output_option, progress_bar, source_arguments, talk_options
+from placerec.cli.options import (
+    FILE,
+    descriptor_option,
+    json_option,
+    output_option,
+    progress_bar,
+    source_arguments,
+    talk_options,
+)
 
 
 @click.command("show-words", epilog="Example: placerec show-words words.npz RUNS/ -o words.png")
 @click.argument("words", metavar="words.npz", type=FILE)
 @source_arguments
+@descriptor_option("The frames' descriptors, if those of the dictionary were computed elsewhere.")
 @output_option("words.png", "Draw all words on one sheet: .png, .svg or .pdf.", required=False)
 @json_option("Print JSON, with a row for every unit of the map.")
 @talk_options
-def show_words(words: Path, sources: tuple[Path, ...], format_: str, out: Path | None, as_json: bool) -> None:
+def show_words(
+    words: Path,
+    sources: tuple[Path, ...],
+    format_: str,
+    descriptor: tuple[str, Path] | None,
+    out: Path | None,
+    as_json: bool,
+) -> None:
     """Show the typical frame and place of each word.
 
     SOURCE is what tokenize takes: the frames to look at, of the training or of later runs. For every unit of the map
@@ -25,5 +41,6 @@ def show_words(words: Path, sources: tuple[Path, ...], format_: str, out: Path |
     from placerec.evaluation.word_table import format_words
 
     with progress_bar("describe") as progress:
-        table = run(words, sources, out, format=format_, progress=progress)
+        matrix = descriptor and descriptor[1]
+        table = run(words, sources, out, matrix=matrix, format=format_, progress=progress)
     click.echo(json.dumps(table.to_json(), indent=2, ensure_ascii=False) if as_json else format_words(table))

@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 _WIDTH, _MARGIN, _PANEL, _GAP, _HEAD = 14.0, 0.3, 2.5, 0.225, 1.1
 _SCALES = ("finest", "fine", "coarse", "coarsest")
 _TURNS, _BLOCKS = 6, 4
-_READING = (
+_ROSES = (
     "A rose shows one window: its petals point along the edges there, and are as long as these are strong, each scale "
-    "by its own longest. Below: the nearest units, the word framed."
+    "by its own longest. "
 )
+_BELOW = "Below: the nearest units, the word framed."
 # Okabe and Ito's blue and vermilion: told apart by any eye, and on grey.
 _ROSE, _MARK = "#0072B2", "#D55E00"
 
@@ -45,12 +46,15 @@ def draw_frame_sheet(view: FrameView, typical: Sequence[Path | None], path: Path
             axes.set_yticks([])
             return axes
 
+        edges = view.spec.kind == "gist"
         title = f"{shorten(view.name, 70)}: word {view.words[view.unit]}"
         figure.text(_MARGIN / _WIDTH, 1 - 0.42 / height, title, fontsize=15)
-        figure.text(_MARGIN / _WIDTH, 1 - 0.7 / height, _READING, fontsize=8.5, color="0.25")
-        _windows(panel(_MARGIN, _HEAD), view.picture, "As the descriptor gets it, in 4 x 4 windows")
+        reading = _ROSES * edges + _BELOW
+        figure.text(_MARGIN / _WIDTH, 1 - 0.7 / height, reading, fontsize=8.5, color="0.25")
+        how = "As the descriptor gets it" + ", in 4 x 4 windows" * edges
+        _fitted(panel(_MARGIN, _HEAD), view.picture, how, windows=edges)
         step = _PANEL + _GAP
-        if view.values.size == len(_SCALES) * _TURNS * _BLOCKS**2:
+        if edges:
             for scale, energy in enumerate(energies(view.values)):
                 _roses(panel(_MARGIN + (scale + 1) * step, _HEAD), view.picture, energy, _SCALES[scale])
         else:
@@ -72,12 +76,12 @@ def energies(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return values.reshape(len(_SCALES), _TURNS, _BLOCKS, _BLOCKS).transpose(0, 1, 3, 2)
 
 
-def _windows(axes: "Axes", picture: NDArray[Any], title: str, paleness: float = 0.0) -> None:
-    """The picture with the lines between its windows; `paleness` 1 is white."""
+def _fitted(axes: "Axes", picture: NDArray[Any], title: str, *, windows: bool, paleness: float = 0.0) -> None:
+    """The picture, with the lines between its 4 x 4 windows or not; `paleness` 1 is white."""
     side = picture.shape[0]
     shown = picture * (1 - paleness) + 255 * paleness
     axes.imshow(shown, cmap="gray", vmin=0, vmax=255, extent=(0, side, side, 0), interpolation="nearest")
-    for line in np.arange(1, _BLOCKS) * side / _BLOCKS:
+    for line in np.arange(1, _BLOCKS) * side / _BLOCKS if windows else []:
         axes.axhline(line, color="0.75", linewidth=0.7)
         axes.axvline(line, color="0.75", linewidth=0.7)
     axes.set(xlim=(0, side), ylim=(side, 0))
@@ -90,7 +94,7 @@ def _roses(axes: "Axes", picture: NDArray[Any], energy: NDArray[np.float32], nam
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 
-    _windows(axes, picture, f"Edges of the {name} scale", paleness=0.85)
+    _fitted(axes, picture, f"Edges of the {name} scale", windows=True, paleness=0.85)
     cell = picture.shape[0] / _BLOCKS
     largest = float(energy.max()) or 1.0
     petals = []
@@ -109,8 +113,8 @@ def _roses(axes: "Axes", picture: NDArray[Any], energy: NDArray[np.float32], nam
 
 def _values(axes: "Axes", values: NDArray[np.float32]) -> None:
     """A descriptor whose values have no place in the picture, as bars."""
-    axes.bar(np.arange(len(values)), values, width=1.0, color=_ROSE)
-    axes.set_xlim(-0.5, len(values) - 0.5)
+    axes.stairs(values, fill=True, color=_ROSE)
+    axes.set_xlim(0, len(values))
     axes.set_title(f"The {len(values)} values of the descriptor", loc="left", fontsize=8.5)
     axes.set_yticks([0.0, float(values.max())], labels=["0", f"{values.max():.3g}"], fontsize=7)
     axes.spines[:].set_color("0.7")

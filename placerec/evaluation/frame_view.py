@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from placerec.evaluation.summary import percent, shorten
 from placerec.evaluation.word_table import WordTable
 from placerec.frames import read_gray
-from placerec.vision import Dictionary, descriptor, fit_image
+from placerec.vision import DescriptorSpec, Dictionary, descriptor, fit_image
 from placerec.vision.images import Gray
 from placerec.vision.pca import project
 
@@ -18,7 +18,7 @@ NEAREST = 5
 
 @dataclass(frozen=True, eq=False)
 class FrameView:
-    """One image and a dictionary: `picture` is the image as it is fitted, `values` its descriptor.
+    """One image and a dictionary: `picture` is the image as it is fitted, `values` its descriptor of kind `spec`.
 
     distances: to every unit, float64 (K,). unit: that of its word, which is the nearest of those that may be words.
     nearest: the five nearest units, live or not, and behind them that of the word if it is not among them. table: what
@@ -26,6 +26,7 @@ class FrameView:
     """
 
     name: str
+    spec: DescriptorSpec
     picture: Gray
     values: NDArray[np.float32]
     words: tuple[str, ...]
@@ -59,6 +60,7 @@ def view_frame(image: Path | str, dictionary: Dictionary, table: WordTable | Non
     nearest = np.argsort(distances, kind="stable")[:NEAREST].tolist()
     return FrameView(
         Path(image).name,
+        spec,
         fit_image(gray, spec.image_size, spec.fit),
         values,
         dictionary.vocabulary,

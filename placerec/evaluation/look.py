@@ -24,17 +24,19 @@ def show_words(
     sources: Iterable[Path | str],
     out: Path | str | None = None,
     *,
+    matrix: Path | str | None = None,
     format: str = "auto",
     progress: Progress | None = None,
 ) -> WordTable:
     """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
 
-    `out`: the picture to draw, PNG, SVG or PDF by suffix. Raises what `find_sequences`, `describe` and
+    `out`: the picture to draw, PNG, SVG or PDF by suffix. `matrix`: the frames' descriptors, for a dictionary of
+    descriptors that were computed elsewhere (`describe`). Raises what `find_sequences`, `describe` and
     `draw_word_sheet` raise.
     """
     dictionary = Dictionary.load(words)
     with _picture(out) as picture:
-        table, typical = _looked_up(sources, dictionary, format, progress)
+        table, typical = _looked_up(sources, dictionary, format, progress, matrix)
         if picture is not None:
             draw_word_sheet(table, typical, picture, title=f"The words of {Path(words).name}")
     return table
@@ -88,11 +90,15 @@ def stability(
 
 
 def _looked_up(
-    sources: Iterable[Path | str], dictionary: Dictionary, format: str, progress: Progress | None
+    sources: Iterable[Path | str],
+    dictionary: Dictionary,
+    format: str,
+    progress: Progress | None,
+    matrix: Path | str | None = None,
 ) -> tuple[WordTable, list[Path | None]]:
     """The table of the sources' frames, and the image file of every unit's typical frame."""
     sequences = find_sequences(sources, format=format)
-    table = word_table(describe(sequences, dictionary.spec, progress=progress), dictionary)
+    table = word_table(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary)
     return table, typical_paths(table, sequences)
 
 

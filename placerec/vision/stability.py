@@ -15,7 +15,7 @@ from placerec.frames import Frame, Sequence, read_gray
 from placerec.vision.describe import Progress
 from placerec.vision.dictionary import Dictionary
 from placerec.vision.images import Gray
-from placerec.vision.spec import DescriptorSpec, descriptor
+from placerec.vision.spec import DescriptorSpec, check_describes_images, descriptor
 
 log = logging.getLogger(__name__)
 
@@ -77,8 +77,9 @@ def word_changes(
 
     The picture is changed as the file holds it, in grey and before it is fitted, and stays of 8 bits where it was.
     Noise is drawn by seed and number of the frame. An image that cannot be read is skipped and named in a warning;
-    VisionError if none can be read.
+    VisionError if none can be read, or if the dictionary is of descriptors that were computed elsewhere.
     """
+    check_describes_images(dictionary.spec)
     sequences = list(sequences)
     frames = [frame for sequence in sequences for frame in sequence.frames]
     words: list[Words] = []

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from small import write_images
 
-from placerec.errors import MissingExtraError, OutputError
+from placerec.errors import MissingExtraError, OutputError, VisionError
 from placerec.evaluation import look
-from placerec.evaluation.frame_sheet import draw_frame_sheet
 from placerec.evaluation.look import show_frame, show_words, stability
 from placerec.evaluation.word_sheet import draw_word_sheet
 from placerec.evaluation.word_stability import format_stability, plot_stability
@@ -137,18 +136,35 @@ def test_long_names_of_many_places_are_shortened_and_nothing_leaves_the_sheet(
     assert [text for text, within in inside.items() if not within] == []
 
 
-def test_a_view_of_a_descriptor_without_windows_is_bars(world: Path, tmp_path: Path) -> None:
+def test_what_is_not_gist_has_bars_and_no_roses(world: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    view = show_frame(min((world / "seq1/std_cam").iterdir()), world / "words.npz")
-    nothing = [None] * len(view.words)
-    draw_frame_sheet(view, nothing, tmp_path / "roses.svg")
-    draw_frame_sheet(replace(view, values=view.values[:100]), nothing, tmp_path / "bars.svg")
+    spec = DescriptorSpec(kind="centrist", image_size=16)
+    train_dictionary([world / "seq1"], tmp_path / "centrist.npz", spec=spec, size=3)
+    image = min((world / "seq1/std_cam").iterdir())
+    show_frame(image, world / "words.npz", out=tmp_path / "roses.svg")
+    show_frame(image, tmp_path / "centrist.npz", out=tmp_path / "bars.svg")
     roses, bars = (drawn_text(tmp_path / f"{name}.svg") for name in ("roses", "bars"))
-    assert "The 100 values of the descriptor" in bars
+    assert f"The {spec.length} values of the descriptor" in bars
     for name in ("finest", "fine", "coarse", "coarsest"):
         assert f"Edges of the {name} scale" in roses
         assert f"Edges of the {name} scale" not in bars
+    assert any(text.startswith("A rose") for text in roses)
+    assert not any(text.startswith("A rose") for text in bars)
     assert "give a SOURCE to see it" in roses
+
+
+def test_words_of_a_matrix_are_shown_and_cannot_be_made_from_images(world: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    matrix, words = tmp_path / "rows.npy", tmp_path / "words.npz"
+    np.save(matrix, np.random.default_rng(0).random((12, 20)).astype(np.float32))
+    train_dictionary([world / "seq1"], words, matrix=matrix, size=3)
+    found = show_words(words, [world / "seq1"], tmp_path / "a.png", matrix=matrix)
+    assert found.is_training
+    assert (tmp_path / "a.png").stat().st_size > 5_000
+    image = min((world / "seq1/std_cam").iterdir())
+    for command in (lambda: show_frame(image, words), lambda: stability([world / "seq1"], words)):
+        with pytest.raises(VisionError, match="were computed elsewhere, and images cannot be described so here"):
+            command()
 
 
 def test_the_table_of_stability() -> None:
