@@ -53,11 +53,8 @@ def train_som(
     epochs = EPOCHS if epochs is None else epochs
     n, mean, deviation = _spread(source)
     codebook = _start(mean, deviation, size, rng)
-    if rule == "online":
-        rows = np.concatenate(list(again(source, n)))
-        codebook = _online(rows, codebook, rng, width, epochs, progress)
-    else:
-        codebook, epochs = _batch(source, n, codebook, width, epochs, progress)
+    learn = {"batch": _batch, "online": _online}[rule]
+    codebook, epochs = learn(source, n, codebook, rng, width, epochs, progress)
     hits = np.zeros(size * size, np.int64)
     for rows in again(source, n):
         hits += np.bincount(_search(rows, codebook), minlength=size * size)
@@ -65,7 +62,13 @@ def train_som(
 
 
 def _batch(
-    source: Source, n: int, codebook: Rows, width: float, epochs: int, progress: Progress | None
+    source: Source,
+    n: int,
+    codebook: Rows,
+    rng: np.random.Generator,
+    width: float,
+    epochs: int,
+    progress: Progress | None,
 ) -> tuple[Rows, int]:
     """The codebook after at most `epochs` passes, and the number of passes that moved it."""
     cooling = (epochs + 1) // 2
@@ -93,18 +96,25 @@ def _batch(
 
 
 def _online(
-    rows: Rows, codebook: Rows, rng: np.random.Generator, width: float, epochs: int, progress: Progress | None
-) -> Rows:
+    source: Source,
+    n: int,
+    codebook: Rows,
+    rng: np.random.Generator,
+    width: float,
+    epochs: int,
+    progress: Progress | None,
+) -> tuple[Rows, int]:
     """Kohonen's rule; the quantisation error that `progress` is told is that of the frames as they were met."""
+    rows = np.concatenate(list(again(source, n)))
     side = round(len(codebook) ** 0.5)
     first, last = max(side / 2, width), width
     place = np.arange(side)
     weights = codebook.astype(np.float64)
     pull = np.empty_like(weights)
-    steps = epochs * len(rows)
+    steps = epochs * n
     for epoch in range(epochs):
         distance = 0.0
-        for step, row in enumerate(rng.permutation(len(rows)).tolist(), start=epoch * len(rows)):
+        for step, row in enumerate(rng.permutation(n).tolist(), start=epoch * n):
             done = step / max(steps - 1, 1)
             np.subtract(rows[row], weights, out=pull)
             # Not a matrix product: the order in which a BLAS adds depends on its threads.
@@ -118,8 +128,8 @@ def _online(
             pull *= np.outer(rate * down, right).reshape(-1, 1)
             weights += pull
         if progress is not None:
-            progress(epoch + 1, epochs, distance / len(rows))
-    return weights.astype(np.float32)
+            progress(epoch + 1, epochs, distance / n)
+    return weights.astype(np.float32), epochs
 
 
 def best_units(
