@@ -3,9 +3,9 @@
 J. Wu, J. M. Rehg: "CENTRIST: a visual descriptor for scene categorization", PAMI 2011. Taken from it, from memory: a
 bit is 1 where the centre is at least its neighbour, the bits go row by row, pixels of the border have no code, and the
 codes 0 and 255 (single specks, flat surfaces) are not counted. Ours: the windows. The paper has a pyramid of 31, each
-with a PCA of its own; here 2 x 2 windows go through the one PCA of the dictionary. On real sequences they gave words as
-good as the pyramid's two coarser levels, and better ones than a single window; 4 x 4 were no better, and are as many
-values as the PCA can take.
+with a PCA of its own; here 2 x 2 windows go through the one PCA of the dictionary. On three real sets they gave words
+as good on average as the pyramid's two coarser levels, and better ones than a single window; 4 x 4 are as many values
+as the PCA can take, and were no better where they were tried.
 """
 
 from typing import Any
