@@ -150,8 +150,11 @@ class Dictionary:
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256 of all that the file holds, 64 hexadecimal digits."""
-        return fingerprint(self._arrays(), self._meta())
+        """SHA-256 of all that decides which word a frame gets, 64 hexadecimal digits.
+
+        Not of what is only told about the map: a later version of placerec must know the dictionary again.
+        """
+        return fingerprint(self._arrays(), {"descriptor": self.spec.as_dict(), "units": self.training.units})
 
     def words(self, descriptors: Rows | Descriptors) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
         """The unit of every descriptor (n, spec.length), int64 (n,), and its distance in PCA space, float32 (n,).

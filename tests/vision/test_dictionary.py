@@ -385,7 +385,7 @@ def test_a_zip_of_something_else_and_other_things_that_are_no_file(tmp_path: Pat
         dictionary.save(path / "words.npz")
 
 
-def test_the_fingerprint_is_of_everything(dictionary: Dictionary) -> None:
+def test_the_fingerprint_is_of_all_that_decides_words(dictionary: Dictionary) -> None:
     moved = dictionary.codebook.copy()
     moved[0, 0] += 1
     others = [
@@ -396,3 +396,5 @@ def test_the_fingerprint_is_of_everything(dictionary: Dictionary) -> None:
     ]
     assert len({one.fingerprint for one in [dictionary, *others]}) == 5
     assert len(dictionary.fingerprint) == 64
+    told = replace(dictionary, quality=replace(dictionary.quality, entropy=0.0))
+    assert told.fingerprint == dictionary.fingerprint
