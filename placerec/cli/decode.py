@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 @click.option("-m", "--model", metavar="MODEL/", type=PATH, required=True, help="The folder of train-lm.")
 @words_option(False, "The dictionary, if TOKENS are images.")
 @format_option(" of images")
-@decoding_options("viterbi")
+@decoding_options("viterbi", "calibrated", "unknown")
 @click.option("--viterbi", is_flag=True, help="Write the most probable path as best.")
+@click.option("--calibrated", is_flag=True, help="Apply what `placerec calibrate` found to the beliefs.")
+@click.option("--unknown", is_flag=True, help="Add a column: the probability that the place is none of the model's.")
 @click.option(
     "--scorer",
     type=click.Choice(["native", "kenlm"]),
@@ -54,7 +56,7 @@ def decode(
     """Find the belief over places for every frame.
 
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, images. `-` reads one word a
-    line (or word, tab, seconds) and answers each at once.
+    line (or word, tab, seconds, tab, distance) and answers each at once.
     """
     from placerec.model import decode as run
     from placerec.model import decode_lines, format_beliefs, load_recognizer
