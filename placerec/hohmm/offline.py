@@ -55,13 +55,19 @@ def believe_unknown(
 
     `distances` (U,): of the selected words, nan where unknown. What counts, and what is held, is as in `believe`.
     """
+    places = evidence.log10_p.shape[1]
+    ratios = unknown_ratios(evidence, transition, model, distances)
+    chain = replace(evidence, log10_p=unknown.chain_evidence(ratios, places))
+    belief, _ = believe(chain, unknown.CHAIN, smooth=smooth, lag=lag)
+    before, _ = unknown.prior(places)
+    return np.where(evidence.updates > 0, belief[:, 0], before)
+
+
+def unknown_ratios(evidence: Evidence, transition: Transition, model: UnknownModel, distances: Floats) -> Floats:
+    """What each selected word says of a new place, float64 (U,): `unknown.evidence` beside the filter of the places."""
     log10_p, elapsed = evidence.log10_p, evidence.elapsed
     predicted = predict_beliefs(filter_stream(log10_p, transition, elapsed).belief, transition, elapsed)
-    ratios = unknown.evidence(model, log10_p, predicted, distances)
-    chain = replace(evidence, log10_p=unknown.chain_evidence(ratios, log10_p.shape[1]))
-    belief, _ = believe(chain, unknown.CHAIN, smooth=smooth, lag=lag)
-    before, _ = unknown.prior(log10_p.shape[1])
-    return np.where(evidence.updates > 0, belief[:, 0], before)
+    return unknown.evidence(model, log10_p, predicted, distances)
 
 
 def most_probable_path(evidence: Evidence, transition: Transition) -> Ints:

@@ -10,6 +10,7 @@ from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
 from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, format_row
 from placerec.hohmm.beliefs import UNKNOWN
+from placerec.hohmm.explain import EXPLAINED, explain_stream
 from placerec.model.corpus import STREAM_SUFFIXES
 from placerec.model.decoding import PAPER, Decoding
 from placerec.model.load import PlaceModels, load_model
@@ -36,31 +37,51 @@ def decode(
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
     `sources`: token streams, or image sources (of `format`) if `words` (a words.npz) is given. Without `out` there must
-    be one sequence only. Raises ModelError or StreamError for what cannot be read or does not belong together.
+    be one sequence only; explanations are written there, as NAME.explain.jsonl. Raises ModelError or StreamError for
+    what cannot be read or does not belong together.
     """
 
-    def decoded() -> list[Beliefs]:
-        models = load_model(model)
-        if words is None:
-            recognizer = make_recognizer(models, options=options, scorer=scorer)
-            streams = token_streams(sources, models)
-        else:
-            recognizer, streams = _image_streams(sources, Path(words), models, format, options, scorer, progress)
-        if out is None and len(streams) > 1:
-            raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
-        ahead = {"smooth": options.smooth, "viterbi": options.viterbi}
-        return [recognizer.decode(stream, **ahead, lag=options.lag) for stream in streams]
-
     if out is None:
-        return decoded()
+        if options.explain:
+            raise ModelError("explanations are files: name a folder for them with -o")
+        _, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress)
+        if len(streams) > 1:
+            raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
+        return [_decoded(recognizer, stream, options) for stream in streams]
     _spare_sources(sources, Path(out))
+    found = []
     with whole_folder(Path(out), OWNED) as folder:
-        found = decoded()
-        for beliefs in found:
+        models, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress)
+        for stream in streams:
+            beliefs = _decoded(recognizer, stream, options)
             suffix = "jsonl" if as_json else "tsv"
             write_text(folder / f"{beliefs.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
+            if options.explain:
+                lines = explain_stream(recognizer, models.models, stream)
+                text = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines)
+                write_text(folder / f"{beliefs.name}{EXPLAINED}", text)
+            found.append(beliefs)
     log.info("%s: %d sequences, %d frames", out, len(found), sum(len(beliefs.frames) for beliefs in found))
     return found
+
+
+def _opened(
+    sources: Sequence[Path | str],
+    model: Path | str,
+    words: Path | str | None,
+    format: str,
+    options: Decoding,
+    scorer: str,
+    progress: Progress | None,
+) -> tuple[PlaceModels, Recognizer, list[WordStream]]:
+    models = load_model(model)
+    if words is not None:
+        return models, *_image_streams(sources, Path(words), models, format, options, scorer, progress)
+    return models, make_recognizer(models, options=options, scorer=scorer), token_streams(sources, models)
+
+
+def _decoded(recognizer: Recognizer, stream: WordStream, options: Decoding) -> Beliefs:
+    return recognizer.decode(stream, smooth=options.smooth, viterbi=options.viterbi, lag=options.lag)
 
 
 def _image_streams(
