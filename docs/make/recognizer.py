@@ -1,14 +1,15 @@
-"""The tables "What to choose when" of docs/recognizer.md: selections and transitions on held-out sequences.
+"""The tables "The numbers" of docs/recognizer.md: selections, transitions and later words on held-out sequences.
 
 python docs/make/recognizer.py DATA/SET... [--test GLOB ...]
 
-Means and standard deviations over five maps of 20 x 20; Witten-Bell. The test sequences of all folds of a set are
-judged together.
+Means and standard deviations over five maps of 20 x 20; Witten-Bell where no other smoothing is named. The test
+sequences of all folds of a set are judged together.
 """
 
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from held_out import arguments, described, folds, part
@@ -27,10 +28,18 @@ HEAD = """\
 | --- | --- | --- | --- | --- | --- | --- |
 """
 SELECTIONS = ("none", "subsample:3", "subsample:5", "compress:3", "unique")
-MODELS = {"none, n = 1": Options(1)} | {
-    f"{name}, n = 2": Options(2, select=parse_selection(name)) for name in SELECTIONS
+MODELS = {
+    "none, n = 1": Options(1),
+    **{f"{name}, n = 2": Options(2, select=parse_selection(name)) for name in SELECTIONS},
+    "unique, n = 2, lidstone-backoff": Options(2, "lidstone-backoff", select=parse_selection("unique")),
 }
 TRANSITIONS = ("fixed per update", "fixed per frame", "learned")
+# What later words add, where all words count and transitions are learned.
+AHEAD: dict[str, dict[str, Any]] = {
+    "lag of 5 frames": {"lag": 5},
+    "smoothed": {"smooth": True},
+    "Viterbi": {"viterbi": True},
+}
 # Per words and transitions.
 Found = dict[tuple[str, str], list[Beliefs]]
 
@@ -58,6 +67,9 @@ def decoded(training: Sequence[WordStream], tests: Sequence[WordStream], vocabul
                 models, selection=options.select, transition=transition(name, training, [*sentences])
             )
             found[words, name] = [recognizer.decode(stream) for stream in tests]
+            if words == "none, n = 2" and name == "learned":
+                for title, ahead in AHEAD.items():
+                    found[words, f"learned, {title}"] = [recognizer.decode(stream, **ahead) for stream in tests]
     return found
 
 

@@ -22,8 +22,8 @@ log = logging.getLogger(__name__)
 def calibration_of(model: PlaceModels, options: Decoding) -> Calibration:
     """The calibration in model.json; ModelError if there is none, or none that can be used.
 
-    If it was fitted with other options than `options`, a warning names them: its temperature changes no decision and
-    is nearer to the truth than none, but how sure the beliefs should be was measured on others.
+    If it was fitted with other options than `options`, a warning names them. It is no error, since a temperature
+    changes no decision.
     """
     stored = _stored(model)
     if stored is None:
