@@ -40,7 +40,6 @@ def decode(
     be one sequence only; explanations are written there, as NAME.explain.jsonl. Raises ModelError or StreamError for
     what cannot be read or does not belong together.
     """
-
     if out is None:
         if options.explain:
             raise ModelError("explanations are files: name a folder for them with -o")
