@@ -29,7 +29,7 @@ _ROOMS = {
         "read_transitions",
     ),
     "placerec.model": ("Decoding", "Options", "calibrate", "decode", "load_recognizer", "train_lm", "update"),
-    "placerec.evaluation": ("evaluate", "evaluate_files"),
+    "placerec.evaluation": ("evaluate", "evaluate_files", "inspect_decision"),
     "placerec.evaluation.look": ("show_frame", "show_words", "stability"),
     "placerec.lab": ("render_lab",),
 }
@@ -37,7 +37,7 @@ _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 
 if TYPE_CHECKING:
     from placerec.errors import PlacerecError
-    from placerec.evaluation import evaluate, evaluate_files
+    from placerec.evaluation import evaluate, evaluate_files, inspect_decision
     from placerec.evaluation.look import show_frame, show_words, stability
     from placerec.frames import Frame, Sequence, find_sequences, read_gray
     from placerec.hohmm import (
@@ -88,6 +88,7 @@ __all__ = [
     "find_sequences",
     "fixed_transition",
     "gist",
+    "inspect_decision",
     "inspect_model",
     "learned_transition",
     "load_recognizer",

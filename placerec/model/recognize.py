@@ -10,6 +10,7 @@ from placerec.lm.external import kenlm_scorer
 from placerec.model.corpus import check_dictionary, read_streams, stream_files
 from placerec.model.decoding import PAPER, Decoding, transition_of
 from placerec.model.load import PlaceModels, load_model
+from placerec.model.trust import calibration_of, unknown_model_of
 from placerec.words import WordStream
 
 if TYPE_CHECKING:
@@ -25,9 +26,10 @@ def load_recognizer(
 ) -> Recognizer:
     """The recognizer of a MODEL/ folder.
 
-    `options`: its transitions, and what ends a sequence. `dictionary`: what turns images into words. `scorer`:
-    `native`, or `kenlm` (MissingExtraError where it is not installed). Raises ModelError if the dictionary is not the
-    one that made the training words, and as `transition_of` does.
+    `options`: its transitions, what ends a sequence, and what else is asked of it. `dictionary`: what turns images into
+    words. `scorer`: `native`, or `kenlm` (MissingExtraError where it is not installed). Raises ModelError if the
+    dictionary is not the one that made the training words, and as `transition_of`, `calibration_of` and
+    `unknown_model_of` do.
     """
     return make_recognizer(load_model(path), options=options, dictionary=dictionary, scorer=scorer)
 
@@ -55,6 +57,8 @@ def make_recognizer(
         dictionary=dictionary,
         max_gap=options.max_gap,
         emissions=_kenlm(model) if scorer == "kenlm" else None,
+        calibration=calibration_of(model, options) if options.calibrated else None,
+        unknown=unknown_model_of(model) if options.unknown else None,
     )
 
 

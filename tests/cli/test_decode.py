@@ -1,5 +1,7 @@
 """`placerec decode`: options that exclude each other are errors of usage, and the others reach the recognizer."""
 
+import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -7,7 +9,7 @@ from click.testing import CliRunner, Result
 from small import PLACES, write_tokens
 
 from placerec.cli import commands
-from placerec.model import train_lm
+from placerec.model import calibrate, train_lm
 
 
 def decode(*args: object, stdin: str | None = None) -> Result:
@@ -84,3 +86,52 @@ def test_a_stream_has_a_clock(world: Path) -> None:
     refused = decode(*args, stdin="w01\n")
     assert refused.exit_code == 1
     assert "<stdin>:1: the frame has no time" in refused.stderr
+
+
+def test_calibration_and_what_is_unknown_reach_files_and_streams(world: Path, tmp_path: Path) -> None:
+    shutil.copytree(world / "model", tmp_path / "model")
+    run = world / "tokens/run3.tsv", "-m", tmp_path / "model"
+    missing = decode(*run, "--calibrated")
+    assert missing.exit_code == 1
+    assert "is not calibrated; run `placerec calibrate" in missing.stderr
+    calibrate(tmp_path / "model", [world / "tokens/run3.tsv"])
+    plain, calibrated, unknown = (decode(*run, *args) for args in ((), ("--calibrated",), ("--unknown",)))
+    assert plain.stdout != calibrated.stdout
+    assert unknown.stdout.splitlines()[0] == plain.stdout.splitlines()[0] + "\tunknown"
+    words = [line.split("\t")[3] + "\n" for line in plain.stdout.splitlines()[1:]]
+    both = "--calibrated", "--unknown", "--json"
+    lines = [decode(*args, *both, stdin="".join(words)).stdout.splitlines() for args in (run, ("-", *run[1:]))]
+    for filed, streamed in zip(*(map(json.loads, one) for one in lines), strict=True):
+        assert streamed["unknown"] == pytest.approx(filed["unknown"], abs=1e-9)
+        assert streamed["belief"] == pytest.approx(filed["belief"], abs=1e-9)
+    assert "was calibrated for other options (stay 0.99)" in decode(*run, "--calibrated", "--stay", "0.5").stderr
+
+
+def test_decisions_are_written_and_read(world: Path, tmp_path: Path) -> None:
+    args = world / "tokens/run3.tsv", "-m", world / "model", "--explain"
+    for misuse, message in (
+        (args, "--explain writes files beside the beliefs: it needs -o"),
+        ((*args, "-o", tmp_path / "b", "--smooth"), "explain tells how the filter decides word by word: it takes none"),
+        (("-", *args[1:]), "`-` answers on stdout and writes no files: it takes no --explain"),
+    ):
+        refused = decode(*misuse)
+        assert (refused.exit_code, refused.stdout) == (2, "")
+        assert message in refused.stderr
+    for more, name in (((), "run3.tsv"), (("--json",), "run3.jsonl")):
+        assert decode(*args, "-o", tmp_path / "b", *more).exit_code == 0
+        assert sorted(path.name for path in (tmp_path / "b").iterdir()) == sorted(["run3.explain.jsonl", name])
+    reasons = [json.loads(line) for line in (tmp_path / "b/run3.explain.jsonl").read_text().splitlines()]
+    beliefs = [json.loads(line) for line in (tmp_path / "b/run3.jsonl").read_text().splitlines()]
+    assert [one["best"] for one in reasons] == [one["best"] for one in beliefs]
+
+    def inspect(*args: object) -> Result:
+        return CliRunner().invoke(commands, ["inspect", *map(str, args)], prog_name="placerec")
+
+    path, page = tmp_path / "b/run3.explain.jsonl", tmp_path / "page.html"
+    shown = inspect(path, "12", "-o", page)
+    assert shown.stdout.startswith("Frame 12 at 6 s: ")
+    assert page.read_text().startswith("<!doctype html>")
+    assert json.loads(inspect(path, "12", "--json").stdout) == reasons[12]
+    for wrong, code in (((path,), 2), ((path, "1", "2"), 2), ((path, "12", "--top", "3"), 2), ((path, "99"), 1)):
+        assert inspect(*wrong).exit_code == code
+    assert inspect(world / "model/hall.arpa", "-o", page).exit_code == 2
