@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text, write_text
 from placerec.lm.arpa_text import LOG_ZERO, first_lines
-from placerec.lm.backoff import BackoffModel, Singles, score_ids
+from placerec.lm.backoff import BackoffModel, score_ids
+from placerec.lm.logs import Singles
 from placerec.lm.trie import Ints, Trie, Vocabulary
 
 log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.backoff import Singles
+from placerec.lm.logs import Singles
 from placerec.lm.trie import Ints
 
 LOG_ZERO = -99.0

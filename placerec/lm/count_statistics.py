@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from placerec.errors import LanguageModelError
 from placerec.lm.counts import Mask, NgramCounts
-from placerec.lm.draft import EPSILON
+from placerec.lm.logs import EPSILON
 from placerec.lm.trie import Ints, per_context
 
 Floats = NDArray[np.float64]

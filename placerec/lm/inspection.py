@@ -12,7 +12,7 @@ from placerec.files import read_text
 from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.checks import context_sums
-from placerec.lm.counts import SENTENCE_START
+from placerec.lm.markers import SENTENCE_START
 
 
 def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5) -> dict[str, Any]:

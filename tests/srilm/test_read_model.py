@@ -1,5 +1,6 @@
 """The tolerant ARPA reader: its messages, what it keeps and drops, and the order in which contexts are found."""
 
+import re
 from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -10,10 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.lm.draft import Draft
-from placerec.srilm import arpa
-from placerec.srilm.arpa import log_value, read_model
+from placerec.srilm import arpa_reader
+from placerec.srilm.arpa import read_model
+from placerec.srilm.arpa_reader import log_value
 from placerec.srilm.arpa_text import format_draft
 from placerec.srilm.context_order import ContextTimes, message_order
+from placerec.srilm.ngram import ngram
 from placerec.srilm.streams import SrilmError, Streams
 from placerec.srilm.vocabulary import WordList
 
@@ -170,7 +173,7 @@ def test_whole_blocks_are_read_as_line_by_line(tmp_path_factory: pytest.TempPath
     folder = tmp_path_factory.mktemp("models")
     quick, times, said = read(text, folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(arpa, "parse_block", lambda *args, **options: None)
+        patch.setattr(arpa_reader, "parse_block", lambda *args, **options: None)
         slow, slow_times, slow_said = read(text, folder)
     assert said == slow_said
     assert format_draft(quick) == format_draft(slow)
@@ -178,6 +181,25 @@ def test_whole_blocks_are_read_as_line_by_line(tmp_path_factory: pytest.TempPath
         np.testing.assert_array_equal(quick.trie.keys[n], slow.trie.keys[n])
         np.testing.assert_array_equal(quick.node[n], slow.node[n])
         np.testing.assert_array_equal(times.created[n], slow_times.created[n])
+
+
+@settings(max_examples=100, deadline=None)
+@given(models(), st.lists(st.lists(names, max_size=6), max_size=4), st.integers(1, 4))
+def test_a_model_read_for_scoring_gives_the_same_answers(
+    tmp_path_factory: pytest.TempPathFactory, text: str, sentences: list[list[str]], order: int
+) -> None:
+    folder = tmp_path_factory.mktemp("models")
+    (folder / "m").write_text(text, encoding="latin-1")
+    lines = "".join(" ".join(words) + "\n" for words in sentences)
+    command = ["-order", str(order), "-lm", str(folder / "m"), "-ppl", "-", "-debug"]
+    # At debug level 3 the whole model is read.
+    seen = {}
+    for debug in ("2", "3"):
+        out, err = BytesIO(), BytesIO()
+        assert ngram([*command, debug], Streams(BytesIO(lines.encode("latin-1")), out, err)) == 0
+        said = [line for line in err.getvalue().splitlines() if line and b"for this context sum to" not in line]
+        seen[debug] = re.sub(rb" / \S+$", b"", out.getvalue(), flags=re.MULTILINE), said
+    assert seen["2"] == seen["3"]
 
 
 class Table:

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.errors import LanguageModelError
-from placerec.lm.backoff import BackoffModel, Singles
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN, Mask, NgramCounts
+from placerec.lm.backoff import BackoffModel
+from placerec.lm.counts import Mask, NgramCounts
 from placerec.lm.discounts import Context, Floats, Rule
-from placerec.lm.draft import EPSILON, Draft, insert_prefixes, log10, p_of, weigh_contexts
+from placerec.lm.draft import Draft, insert_prefixes, weigh_contexts
+from placerec.lm.logs import EPSILON, Singles, log10, p_of
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import Smoothing
 from placerec.lm.trace import SILENT, Trace
 from placerec.lm.trie import Ints, Trie, per_context, runs
