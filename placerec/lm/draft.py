@@ -80,7 +80,7 @@ class Draft:
                 rows = np.flatnonzero(shorter)
 
     def model(self) -> BackoffModel:
-        """The model without the rows that hold nothing."""
+        """The model without the rows that hold nothing; the prefixes of what is stored must be stored."""
         backoffs = [
             np.where(node, backoff, np.float32(np.nan)).astype(np.float32)[stored]
             for node, backoff, stored in zip(self.node, self.backoff, self.stored, strict=True)

@@ -82,6 +82,10 @@ def estimate_draft(
     return draft
 
 
+# Enough for contexts that were counted 3e10 times: SRILM adds 1 until 3 in a million is left.
+_MOST_ATTEMPTS = 100_000
+
+
 @dataclass(frozen=True)
 class _MetaCounts:
     """Which words are meta counts (bool (V,)), and of how many occurrences each (0: the tag alone, an extra total)."""
@@ -211,6 +215,12 @@ def _fill_order(draft: Draft, order: _Order, trace: Trace) -> None:
         total = np.where(todo & ~interpolate, total + 1, total)
         interpolate = interpolate & ~todo
         attempt += 1
+        if todo.any() and attempt == _MOST_ATTEMPTS:
+            most = float(total[todo].max())
+            raise LanguageModelError(
+                f"a context of the {n}-grams was counted {most:g} times: so often that what it leaves to unseen words"
+                " is lost in rounding; divide the counts, or use another smoothing"
+            )
     stored = order.rows[kept]
     draft.log10_p[n - 1][stored] = log10(p[kept])
     draft.stored[n - 1][stored] = True

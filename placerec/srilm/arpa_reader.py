@@ -8,15 +8,15 @@ from placerec.lm.logs import Mask
 from placerec.lm.trie import Ints
 from placerec.srilm.arpa_block import LOG_ZERO, Block, parse_block
 from placerec.srilm.fields import Fields, NameTable
-from placerec.srilm.options import leading_float
+from placerec.srilm.options import bounded_int, leading_float
 from placerec.srilm.streams import SPACES, Lines, SrilmError, Streams, tokens
 from placerec.srilm.vocabulary import WordList
 
 _MOST_ORDERS = 100
 _BLOCK = 1 << 19
-_COUNT = re.compile(r"ngram\s*([-+]?\d+)=\s*([-+]?\d+)")
-_SECTION = re.compile(r"\\([-+]?\d+)-grams")
-_DECIMAL = re.compile(r"-?\d*\.?\d*")
+_COUNT = re.compile(r"ngram\s*([-+]?\d+)=\s*([-+]?\d+)", re.ASCII)
+_SECTION = re.compile(r"\\([-+]?\d+)-grams", re.ASCII)
+_DECIMAL = re.compile(r"-?\d*\.?\d*", re.ASCII)
 
 
 class _FormatError(Exception):
@@ -151,7 +151,7 @@ class Reader:
         elif self.state != "header" and line.startswith("\\end\\"):
             self.end()
         elif match := _SECTION.match(line):
-            self.begin(int(match[1]))
+            self.begin(_signed(match[1]))
         elif self.state == "header":
             self.promise(line)
         elif self.state == "ngrams":
@@ -162,7 +162,7 @@ class Reader:
         match = _COUNT.match(line)
         if not match:
             raise _FormatError("unexpected input")
-        n, size = int(match[1]), int(match[2])
+        n, size = _signed(match[1]), _signed(match[2])
         if not 1 <= n <= _MOST_ORDERS:
             raise _FormatError(f"ngram order {n} out of range")
         if size < 0:
@@ -257,6 +257,11 @@ class Reader:
             line = min(predicted)
             message = f"warning: non-zero probability for {words.unknown} in closed-vocabulary LM"
             self.said.append((line, 0, f"{self.name}: line {line}: {message}"))
+
+
+def _signed(text: str) -> int:
+    size = bounded_int(text.lstrip("+-"))
+    return -size if text.startswith("-") else size
 
 
 def _next_headline(data: bytes, start: int) -> int:

@@ -10,8 +10,8 @@ from placerec.srilm.vocabulary import WordList, read_words
 
 TOOL = "change-lm-vocab"
 USAGE = "usage: {tool} -vocab FILE [-lm FILE] [-write-lm FILE] [-subset] [-tolower] [options of ngram]"
-_HEADER = re.compile(r"ngram\s*(\d+)\s*=\s*\d+")
-_SECTION = re.compile(r"\\(\d+)-grams")
+_HEADER = re.compile(r"ngram\s*(\d{1,18})\s*=\s*\d+", re.ASCII)
+_SECTION = re.compile(r"\\(\d{1,18})-grams", re.ASCII)
 
 
 @exit_status

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from placerec.lm.arpa import row_blocks
 from placerec.lm.draft import Draft, reweigh, unite
 from placerec.lm.mix import merge, merge_weight
 from placerec.lm.passage import Passage
 from placerec.lm.prune import prune, prune_improbable
 from placerec.srilm.arpa import read_model
-from placerec.srilm.arpa_text import format_draft
 from placerec.srilm.context_order import ContextTimes, message_order
 from placerec.srilm.messages import Messages
 from placerec.srilm.mixed_scorers import Cached, Lenient, LogLinear, Mixture
@@ -159,12 +159,16 @@ class Models:
 
     def write(self, name: str) -> None:
         """`-write-lm`."""
-        if self.draft is None:
+        draft = self.draft
+        if draft is None:
             self.streams.write(name, "")
             self.streams.say("write() method not implemented")
             self.streams.say(f"error writing {name}")
             return
         if self.debug >= 1:
-            for n, stored in enumerate(self.draft.stored, start=1):
+            for n, stored in enumerate(draft.stored, start=1):
                 self.streams.say(f"writing {int(stored.sum())} {n}-grams")
-        self.streams.write(name, format_draft(self.draft))
+        with self.streams.output(name) as file:
+            # SRILM writes an n-gram though its first words are not listed.
+            columns = draft.log10_p, draft.backoff, draft.node
+            file.writelines(row_blocks(draft.trie, *columns, stored=draft.stored, encoding="latin-1"))

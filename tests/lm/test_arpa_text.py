@@ -94,5 +94,6 @@ def test_long_words_and_nuls_are_written_plainly(word: str) -> None:
     lines = first_lines([word, "b"], "latin-1")
     assert isinstance(lines, PlainLines)
     place = np.zeros(1, np.int64)
-    written = b"".join(lines.blocks(np.array([-1.5], np.float32), np.array([np.nan], np.float32), place, place))
+    number = np.array([-1.5], np.float32)
+    written = b"".join(lines.blocks(number, number, np.zeros(1, bool), place, place))
     assert written == f"\n-1.5\t{word}".encode()
