@@ -19,9 +19,9 @@ _NUMBER = re.compile(rb"-?\d+(\.\d*)?([eE][-+]?\d+)?")
 
 
 class Block(NamedTuple):
-    """N-grams of one order: line numbers (m,), words as SRILM's numbers (m, n), log10 p (m,), weights (m,).
+    """N-grams of one order: line numbers (m,) from 1, words as SRILM's numbers (m, n), log10 p (m,), weights (m,).
 
-    `weighted` bool (m,): the line has a weight. `last`: the number of the last line, which may be empty.
+    `weighted` bool (m,): the line has a weight. `size`: how many lines there are, empty ones too.
     """
 
     lines: Ints
@@ -29,12 +29,10 @@ class Block(NamedTuple):
     log10_p: Singles
     weighted: Mask
     backoff: Singles
-    last: int
+    size: int = 0
 
 
-def parse_block(
-    data: bytes, n: int, first_line: int, numbered: Callable[[Fields, Ints], Ints], *, weights: str
-) -> Block | None:
+def parse_block(data: bytes, n: int, numbered: Callable[[Fields, Ints], Ints], *, weights: str) -> Block | None:
     """The n-grams of order n in whole lines; None if there is anything unusual about them.
 
     `numbered`: gives the numbers of fields that are words, -1 for a word that is not listed. `weights`: `read` them;
@@ -59,7 +57,7 @@ def parse_block(
     every = np.zeros(len(lines), np.float32)
     every[weighted] = backoff
     words = words.reshape(-1, n)
-    return Block(lines + first_line, words, log10_p, weighted, every, first_line + len(physical) - 1)
+    return Block(lines + 1, words, log10_p, weighted, every, len(physical))
 
 
 def _weights(fields: Fields, at: Ints, what: str) -> Singles | None:

@@ -1,9 +1,11 @@
 """Reading ARPA files tolerantly, line by line or many lines at once; section 8 of our SRILM specification."""
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
+from placerec.lm.ahead import work_ahead
 from placerec.lm.logs import Mask
 from placerec.lm.trie import Ints
 from placerec.srilm.arpa_block import LOG_ZERO, Block, parse_block
@@ -40,7 +42,6 @@ class Reader:
         self.read_so_far: dict[int, int] = {}
         self.state = "before"
         self.section = 0
-        self.section_end = 0
         self.slow: list[tuple[int, list[int], float, bool, float]] = []
         self.outside = 0
         self.failure = ""
@@ -100,36 +101,33 @@ class Reader:
         self.number = lines.number
 
     def read_section(self, data: bytes, start: int) -> int:
-        """Take the lines from `start` to the next one that starts with a backslash, or as many as go at a time."""
-        if start >= self.section_end:
-            self.section_end = _next_headline(data, start)
-        end = self.section_end
+        """Take the lines from `start` to the next one that starts with a backslash, many at a time."""
+        end = _next_headline(data, start)
         if self.state == "skip":
             self.number += data.count(b"\n", start, end) + (not data.endswith(b"\n", start, end))
             return end
-        if end - start > _BLOCK:
-            end = data.find(b"\n", start + _BLOCK, end) + 1 or end
-        chunk = data[start:end]
-        block = self.quick_block(chunk)
-        if block is not None:
-            self.keep_lines()
-            self.keep(block)
-            self.read_so_far[self.section] += len(block.lines)
-            self.number = block.last
-            return end
-        for line in chunk.decode("latin-1").removesuffix("\n").split("\n"):
-            self.number += 1
-            self.take(line)
+        chunks = _chunks(data, start, end)
+        # 1-grams add their words in order.
+        blocks = map(self.quick_block, chunks) if self.section == 1 else work_ahead(self.quick_block, chunks)
+        for chunk, block in blocks:
+            if block is not None:
+                self.keep_lines()
+                self.keep(block._replace(lines=block.lines + self.number))
+                self.read_so_far[self.section] += len(block.lines)
+                self.number += block.size
+                continue
+            for line in chunk.decode("latin-1").removesuffix("\n").split("\n"):
+                self.number += 1
+                self.take(line)
         return end
 
-    def quick_block(self, chunk: bytes) -> Block | None:
-        """The lines at once; None if one of them is unusual."""
+    def quick_block(self, chunk: bytes) -> tuple[bytes, Block | None]:
+        """Lines, and what they hold if none of them is unusual."""
         n = self.section
         weights = "zero" if n == self.top else "ignore" if n == self.order else "read"
         if (n == 1 and self.limited) or (self.words.lower and chunk != chunk.lower()):
-            return None
-        numbered = self.added if n == 1 else self.known
-        return parse_block(chunk, n, self.number + 1, numbered, weights=weights)
+            return chunk, None
+        return chunk, parse_block(chunk, n, self.added if n == 1 else self.known, weights=weights)
 
     def added(self, fields: Fields, at: Ints) -> Ints:
         """The numbers of words, which are added where they are new."""
@@ -137,9 +135,10 @@ class Reader:
 
     def known(self, fields: Fields, at: Ints) -> Ints:
         """The numbers of words, -1 of those that are not listed."""
-        if self.names is None or self.names.size != len(self.words.index):
-            self.names = NameTable(self.words.index)
-        return self.names.find(fields, at)
+        names = self.names
+        if names is None or names.size != len(self.words.index):
+            names = self.names = NameTable(self.words.index)
+        return names.find(fields, at)
 
     def take(self, line: str) -> None:
         """One line, in the state that the lines before have led to."""
@@ -190,7 +189,7 @@ class Reader:
         if self.slow:
             lines, words, log10_p, weighted, backoff = map(np.array, zip(*self.slow, strict=True))
             single = np.float32
-            self.keep(Block(lines, words, log10_p.astype(single), weighted, backoff.astype(single), self.number))
+            self.keep(Block(lines, words, log10_p.astype(single), weighted, backoff.astype(single)))
             self.slow = []
 
     def close(self) -> None:
@@ -262,6 +261,14 @@ class Reader:
 def _signed(text: str) -> int:
     size = bounded_int(text.lstrip("+-"))
     return -size if text.startswith("-") else size
+
+
+def _chunks(data: bytes, start: int, end: int) -> Iterator[bytes]:
+    """Whole lines."""
+    while start < end:
+        stop = data.find(b"\n", start + _BLOCK, end) + 1 or end
+        yield data[start:stop]
+        start = stop
 
 
 def _next_headline(data: bytes, start: int) -> int:

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from placerec.lm.ahead import work_ahead
 from placerec.lm.logs import Floats, Mask, p_of
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
@@ -93,9 +94,16 @@ class Printer:
 def print_perplexity(name: str, scorer: Scorer, printer: Printer, handling: Handling, *, whole: bool) -> None:
     """`-ppl`: score a text and print what `printer.debug` asks for; `whole`: in one go (a cache runs on and on)."""
     parts = read_sentences(name, printer.words, handling, printer.streams)
+    if whole:
+        parts = iter([joined(list(parts))])
     summary = _Summary(printer)
-    for sentences in [joined(list(parts))] if whole else parts:
-        summary.add(sentences, *_score(scorer, printer, sentences, *mark(sentences, printer.words, handling)))
+
+    def score(sentences: Sentences) -> tuple[Sentences, Floats, list[_Line]]:
+        return sentences, *_score(scorer, printer, sentences, *mark(sentences, printer.words, handling))
+
+    # What is said about single words is said as they are scored.
+    for scored in map(score, parts) if printer.debug else work_ahead(score, parts):
+        summary.add(*scored)
     summary.finish(name)
 
 
@@ -140,9 +148,14 @@ def _token_lines(printer: Printer, view: View, scored: Scored, batch: _Batch) ->
     sentence = np.repeat(np.arange(len(batch.lengths)), batch.lengths)[at]
     columns = (at, begin[at], sentence, opening, scored.log10_p[at], p_of(scored.log10_p[at]))
     words = part.ids.tolist()
+    # N-grams repeat, and printing numbers takes long.
+    printed: dict[tuple[int, int, bool, str, float], str] = {}
     for t, start, i, opens, log10_p, p in zip(*(column.tolist() for column in columns), strict=True):
-        before = (printer.name(words[t - 1]) if t > start else "") + (" " if opens else " ...")
-        text = printer.token(words[t], before, scored.tag(t), p, log10_p)
+        key = (words[t - 1] if t > start else -1, words[t], opens, scored.tag(t), log10_p)
+        text = printed.get(key)
+        if text is None:
+            before = (printer.name(key[0]) if t > start else "") + (" " if opens else " ...")
+            text = printed[key] = printer.token(words[t], before, key[3], p, log10_p)
         line = lines[i]
         line.text.append(text + printer.sum(view, t, part.ids[start:t]) + "\n")
         if printer.debug >= RANKS:

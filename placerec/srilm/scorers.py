@@ -109,7 +109,8 @@ class LookupView:
         """The probabilities of the passage's words, or of others in their places."""
         digits = self.digits if words is None else self.lookup.digits(words)
         log10_p, answered = self.lookup.find(self.contexts, digits)
-        return Scored(log10_p, lambda t: f"[{answered[t]}gram]" if answered[t] else "[OOV]")
+        tags = ["[OOV]", *(f"[{n}gram]" for n in range(1, len(self.lookup.tables) + 1))]
+        return Scored(log10_p, lambda t: tags[answered[t]])
 
     def spread(self, t: int) -> Singles:
         """log10 p of every word."""
