@@ -5,7 +5,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from placerec.lm.ahead import work_ahead
 from placerec.lm.logs import Mask
 from placerec.lm.trie import Ints
 from placerec.srilm.arpa_block import LOG_ZERO, Block, parse_block
@@ -106,10 +105,8 @@ class Reader:
         if self.state == "skip":
             self.number += data.count(b"\n", start, end) + (not data.endswith(b"\n", start, end))
             return end
-        chunks = _chunks(data, start, end)
-        # 1-grams add their words in order.
-        blocks = map(self.quick_block, chunks) if self.section == 1 else work_ahead(self.quick_block, chunks)
-        for chunk, block in blocks:
+        for chunk in _chunks(data, start, end):
+            block = self.quick_block(chunk)
             if block is not None:
                 self.keep_lines()
                 self.keep(block._replace(lines=block.lines + self.number))
@@ -121,13 +118,13 @@ class Reader:
                 self.take(line)
         return end
 
-    def quick_block(self, chunk: bytes) -> tuple[bytes, Block | None]:
-        """Lines, and what they hold if none of them is unusual."""
+    def quick_block(self, chunk: bytes) -> Block | None:
+        """The lines at once; None if one of them is unusual."""
         n = self.section
         weights = "zero" if n == self.top else "ignore" if n == self.order else "read"
         if (n == 1 and self.limited) or (self.words.lower and chunk != chunk.lower()):
-            return chunk, None
-        return chunk, parse_block(chunk, n, self.added if n == 1 else self.known, weights=weights)
+            return None
+        return parse_block(chunk, n, self.added if n == 1 else self.known, weights=weights)
 
     def added(self, fields: Fields, at: Ints) -> Ints:
         """The numbers of words, which are added where they are new."""

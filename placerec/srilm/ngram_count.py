@@ -89,7 +89,9 @@ OPTIONS: Options = {
 @exit_status
 def ngram_count(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
     """Run `ngram-count` with these arguments; returns the exit status."""
-    _run(parse(tool, OPTIONS, arguments, streams), streams)
+    # Real counts may be infinite: what comes of them is printed as it is.
+    with np.errstate(all="ignore"):
+        _run(parse(tool, OPTIONS, arguments, streams), streams)
     return 0
 
 

@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 
-from placerec.lm.ahead import work_ahead
 from placerec.lm.logs import Floats, Mask, p_of
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
@@ -97,13 +96,8 @@ def print_perplexity(name: str, scorer: Scorer, printer: Printer, handling: Hand
     if whole:
         parts = iter([joined(list(parts))])
     summary = _Summary(printer)
-
-    def score(sentences: Sentences) -> tuple[Sentences, Floats, list[_Line]]:
-        return sentences, *_score(scorer, printer, sentences, *mark(sentences, printer.words, handling))
-
-    # What is said about single words is said as they are scored.
-    for scored in map(score, parts) if printer.debug else work_ahead(score, parts):
-        summary.add(*scored)
+    for sentences in parts:
+        summary.add(sentences, *_score(scorer, printer, sentences, *mark(sentences, printer.words, handling)))
     summary.finish(name)
 
 
