@@ -12,7 +12,7 @@ import numpy as np
 
 from placerec.lm.logs import Floats, Mask, Singles
 from placerec.lm.trie import Ints
-from placerec.srilm.fields import LONGEST_NAME, PADDING, Fields, Packed, split_lines, unusual
+from placerec.srilm.fields import LONGEST_NAME, PADDING, Fields, Packed, split_lines, with_odd_bytes
 
 LOG_ZERO = -99.0
 _NUMBER = re.compile(rb"-?\d+(\.\d*)?([eE][-+]?\d+)?")
@@ -38,7 +38,7 @@ def parse_block(data: bytes, n: int, numbered: Callable[[Fields, Ints], Ints], *
     `numbered`: gives the numbers of fields that are words, -1 for a word that is not listed. `weights`: `read` them;
     `ignore` them; or, at the file's highest order, let only `zero` pass.
     """
-    if unusual(data):
+    if with_odd_bytes(data):
         return None
     fields, physical = split_lines(data + PADDING, len(data))
     lines = np.flatnonzero(physical)

@@ -10,7 +10,7 @@ from placerec.lm.logs import Floats, Mask
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage
 from placerec.lm.trie import Ints
-from placerec.srilm.fields import PADDING, NameTable, split_lines, unusual, without_comments
+from placerec.srilm.fields import PADDING, NameTable, split_lines, with_odd_bytes, without_comments
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import Lines, Streams, tokens
 from placerec.srilm.vocabulary import WordList
@@ -57,7 +57,7 @@ def read_sentences(name: str, words: WordList, handling: Handling, streams: Stre
     Too long lines are reported and left out.
     """
     lines = streams.lines(name)
-    if handling.weight or handling.escape is not None or handling.verbose or unusual(lines.data):
+    if handling.weight or handling.escape is not None or handling.verbose or with_odd_bytes(lines.data):
         return _read_carefully(lines, words, handling, streams)
     return _read_quickly(lines, words, streams)
 

@@ -1,11 +1,12 @@
 """Many lines at once: their fields, the numbers of words, and decimal numbers, as one by one."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.srilm import arpa_block
-from placerec.srilm.fields import PADDING, Fields, NameTable, split_lines, without_comments
+from placerec.srilm.fields import PADDING, Fields, NameTable, split_lines, unusual, with_odd_bytes, without_comments
 from placerec.srilm.streams import tokens
 
 lines = st.lists(st.text("ab#\t \r\x01\xe9", max_size=8), max_size=6)
@@ -88,3 +89,19 @@ def test_what_is_taken_for_a_short_decimal_is_one(texts: list[str]) -> None:
 def test_fields_near_the_end_can_be_packed() -> None:
     data = b"a\n" + PADDING
     assert Fields(data, np.array([0]), np.array([1])).packed(np.array([0]))[0].tolist() == [ord("a")]
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (b"a # b\n#c\nd##\n", False),
+        (b"## a\n", True),
+        (b"a\n##\n", True),
+        (b"a\0b", True),
+        (b"a\v", True),
+        (b"\f", True),
+    ],
+)
+def test_comments_and_odd_bytes_are_unusual(data: bytes, expected: bool) -> None:
+    assert unusual(data) is expected
+    assert with_odd_bytes(data) is (expected and b"#" not in data)
