@@ -82,8 +82,8 @@ def estimate_draft(
     return draft
 
 
-# Enough for contexts that were counted 3e10 times: SRILM adds 1 until 3 in a million is left.
-_MOST_ATTEMPTS = 100_000
+# SRILM adds 1 to a context's count until 3 in a million is left: a million steps do for counts of 3e11.
+_MOST_STEPS = 1e6
 
 
 @dataclass(frozen=True)
@@ -215,17 +215,22 @@ def _fill_order(draft: Draft, order: _Order, trace: Trace) -> None:
         total = np.where(todo & ~interpolate, total + 1, total)
         interpolate = interpolate & ~todo
         attempt += 1
-        if todo.any() and attempt == _MOST_ATTEMPTS:
-            most = float(total[todo].max())
-            raise LanguageModelError(
-                f"a context of the {n}-grams was counted {most:g} times: so often that what it leaves to unseen words"
-                " is lost in rounding; divide the counts, or use another smoothing"
-            )
+        _check_reachable(n, total[todo], spent[todo])
     stored = order.rows[kept]
     draft.log10_p[n - 1][stored] = log10(p[kept])
     draft.stored[n - 1][stored] = True
     if n > 1:
         draft.add_nodes(n - 1, runs(draft.trie.prefix(n)[stored])[0])
+
+
+def _check_reachable(n: int, total: Floats, spent: Floats) -> None:
+    """Raise LanguageModelError where counts (C,) are so large that adding 1 has (almost) no effect on what is left."""
+    far = ((spent - 1 + EPSILON) * total > _MOST_STEPS) | (total >= 2.0**53)
+    if far.any():
+        raise LanguageModelError(
+            f"a context of the {n}-grams was counted {total[far].max():g} times: so often that what it leaves to unseen"
+            " words is lost in rounding; divide the counts, or use another smoothing"
+        )
 
 
 def _attempt(

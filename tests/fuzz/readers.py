@@ -17,16 +17,18 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from random import Random
+from unittest.mock import patch
 
 import mutations
 import numpy as np
 
 from placerec.errors import PlacerecError
+from placerec.lm import estimation
 from placerec.lm.arpa import format_arpa, read_arpa, write_arpa
 from placerec.lm.inspection import inspect_model
 from placerec.srilm import arpa_reader, sentences
@@ -113,8 +115,11 @@ def fixed_model(path: Path) -> str:
 
 
 def check_counts_again(out: bytes, status: int) -> None:
-    """Sorted counts that were written are read back as they are, but for what looks like a comment."""
-    if status == 0 and not out.startswith(b"##") and b"\n##" not in out:
+    """Sorted counts that were written are read back as they are.
+
+    But for what looks like a comment, and sums beyond 2^63 - 1, which wrap as SRILM's do beyond 2^64 - 1.
+    """
+    if status == 0 and not out.startswith(b"##") and b"\n##" not in out and b"\t-" not in out:
         again = run(ngram_count, "-read", "-", "-order", "9", "-sort", "-write", "-", stdin=out)[1]
         same("counts read back", out, again)
 
@@ -204,7 +209,7 @@ def limited(seconds: float) -> Iterator[None]:
 def fault(reader: Reader, data: bytes, name: str, seed: str) -> str:
     """What goes wrong with an input, and where; an empty text if nothing does."""
     rng = Random(seed)
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), blocks(rng.random() < 0.5):
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), scaled(rng.random() < 0.5):
         warnings.simplefilter("error")
         path = Path(folder) / name
         path.write_bytes(data)
@@ -224,15 +229,14 @@ def fault(reader: Reader, data: bytes, name: str, seed: str) -> str:
 
 
 @contextmanager
-def blocks(small: bool) -> Iterator[None]:
-    """With `small`, files are taken in blocks of a few lines, so that there are several."""
-    former = arpa_reader._BLOCK, sentences._BLOCK
-    if small:
-        arpa_reader._BLOCK = sentences._BLOCK = 40
-    try:
+def scaled(small: bool) -> Iterator[None]:
+    """With `small`, files are taken in blocks of a few lines, so that there are several. Estimation gives up soon."""
+    with ExitStack() as stack:
+        if small:
+            stack.enter_context(patch.multiple(arpa_reader, _BLOCK=40))
+            stack.enter_context(patch.multiple(sentences, _BLOCK=40))
+        stack.enter_context(patch.multiple(estimation, _MOST_STEPS=1e4))
         yield
-    finally:
-        arpa_reader._BLOCK, sentences._BLOCK = former
 
 
 def smallest(data: bytes, still: Callable[[bytes], bool], seconds: float = 30) -> bytes:
