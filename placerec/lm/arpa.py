@@ -22,10 +22,14 @@ from numpy.typing import NDArray
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text, write_text
 from placerec.lm.arpa_text import LOG_ZERO, first_lines
-from placerec.lm.backoff import BackoffModel, Singles, score_ids
+from placerec.lm.backoff import BackoffModel, score_ids
+from placerec.lm.logs import Mask, Singles
 from placerec.lm.trie import Ints, Trie, Vocabulary
 
 log = logging.getLogger(__name__)
+# No file has 10^18 n-grams; of more digits Python may not make a number.
+_COUNT = re.compile(r"ngram\s+(\d{1,18})\s*=\s*(\d{1,18})\s*", re.ASCII)
+_NUMBER = re.compile(r"[-+.0-9A-Za-z]+")
 
 
 def format_arpa(model: BackoffModel, comment: str = "") -> str:
@@ -35,21 +39,43 @@ def format_arpa(model: BackoffModel, comment: str = "") -> str:
 
 def arpa_blocks(model: BackoffModel, comment: str = "", *, encoding: str = "utf-8") -> Iterator[bytes]:
     """The same text in blocks of encoded lines, so that it need not be held whole."""
+    weighted = [~np.isnan(backoff) for backoff in model.backoffs]
+    return row_blocks(model.trie, model.log10_ps, model.backoffs, weighted, comment=comment, encoding=encoding)
+
+
+def row_blocks(
+    trie: Trie,
+    log10_ps: Sequence[Singles],
+    backoffs: Sequence[Singles],
+    weighted: Sequence[Mask],
+    *,
+    stored: Sequence[Mask] | None = None,
+    comment: str = "",
+    encoding: str = "utf-8",
+) -> Iterator[bytes]:
+    """The text of n-grams in the rows of a trie: those that are `stored`, with a weight where `weighted`, (m_n,) each.
+
+    The prefixes of what is stored need not be.
+    """
     start = f"# {comment}\n\n\\data\\\n" if comment else "\n\\data\\\n"
-    sizes = (f"ngram {n}={len(keys)}\n" for n, keys in enumerate(model.trie.keys, start=1))
+    numbers = map(len, trie.keys) if stored is None else (int(mask.sum()) for mask in stored)
+    sizes = (f"ngram {n}={size}\n" for n, size in enumerate(numbers, start=1))
     yield (start + "".join(sizes)).encode(encoding)
-    lines = first_lines(model.words, encoding)
+    words = trie.vocabulary.words
+    lines = first_lines(words, encoding)
     rank = np.zeros(1, np.int64)
-    for n in range(1, model.order + 1):
+    for n in range(1, trie.order + 1):
         yield f"\n\\{n}-grams:".encode()
-        word = model.trie.word(n)
+        word = trie.word(n)
         # SRILM sorts by the context, read from its last word to its first, then by the word.
-        rows, before = _regrouped(model.trie.prefix(n), rank) if n > 1 else (word, np.zeros_like(word))
+        rows, before = _regrouped(trie.prefix(n), rank) if n > 1 else (word, np.zeros_like(word))
         word = word[rows]
-        log10_p, backoff = model.log10_ps[n - 1][rows], model.backoffs[n - 1][rows]
-        yield from lines.blocks(log10_p, backoff, before, word)
-        if n < model.order:
-            by_word = np.argsort(_narrow(word, len(model.words)), kind="stable")
+        shown = slice(None) if stored is None else np.flatnonzero(stored[n - 1][rows])
+        its = rows[shown]
+        log10_p, backoff, has_weight = log10_ps[n - 1][its], backoffs[n - 1][its], weighted[n - 1][its]
+        yield from lines.blocks(log10_p, backoff, has_weight, before[shown], word[shown])
+        if n < trie.order:
+            by_word = np.argsort(_narrow(word, len(words)), kind="stable")
             lines = lines.longer(before[by_word], word[by_word])
             rank = np.empty(len(rows), np.int64)
             rank[rows[by_word]] = np.arange(len(rows))
@@ -150,7 +176,7 @@ class _Reader:
             raise self.error(f"{self.lines[self.line][:40]!r} found, \\data\\ expected; is this an ARPA file?")
         sizes: list[int] = []
         while self.line < len(self.lines) and self.lines[self.line].strip():
-            match = re.fullmatch(r"ngram\s+(\d+)\s*=\s*(\d+)\s*", self.lines[self.line])
+            match = _COUNT.fullmatch(self.lines[self.line])
             if not match or int(match[1]) != len(sizes) + 1:
                 raise self.error(f"{self.lines[self.line][:40]!r} found, 'ngram {len(sizes) + 1}=COUNT' expected")
             sizes.append(int(match[2]))
@@ -198,11 +224,12 @@ class _Reader:
 
     def number(self, text: str, line: int, what: str) -> float:
         try:
-            value = float(text)
+            # Python also takes 1_0, digits of other scripts, and blanks around them.
+            value = float(text) if _NUMBER.fullmatch(text) else np.nan
         except ValueError:
             value = np.nan
         if np.isnan(value):
-            raise self.error(f"{what} {text!r} is not a number", line)
+            raise self.error(f"{what} {text[:60]!r} is not a number", line)
         return value
 
     def keys(self, model: BackoffModel, words: list[list[str]], first: int) -> tuple[BackoffModel, Ints]:

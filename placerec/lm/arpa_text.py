@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.backoff import Singles
+from placerec.lm.logs import Mask, Singles
 from placerec.lm.trie import Ints
 
 LOG_ZERO = -99.0
@@ -34,15 +34,18 @@ class PlainLines:
     words: Sequence[bytes]
     contexts: Sequence[bytes]
 
-    def blocks(self, log10_p: Singles, backoff: Singles, before: Ints, word: Ints) -> Iterator[bytes]:
-        """Lines, each after a line end: log10 probabilities (m,), weights (m,) or nan, contexts (m,), words (m,)."""
+    def blocks(self, log10_p: Singles, backoff: Singles, weighted: Mask, before: Ints, word: Ints) -> Iterator[bytes]:
+        """Lines, each after a line end: log10 p (m,), weights (m,) where `weighted` (m,), contexts (m,), words (m,)."""
         for start in range(0, len(word), _BLOCK):
             block = slice(start, start + _BLOCK)
             fields = zip(
                 _printed(log10_p[block], "\n"),
                 map(self.contexts.__getitem__, before[block].tolist()),
                 map(self.words.__getitem__, word[block].tolist()),
-                _printed(backoff[block], "\t"),
+                [
+                    text * has
+                    for text, has in zip(_printed(backoff[block], "\t"), weighted[block].tolist(), strict=True)
+                ],
                 strict=True,
             )
             yield b"".join(b"%b\t%b%b%b" % line for line in fields)
@@ -60,11 +63,11 @@ class PackedLines:
     words: Cells
     contexts: Cells
 
-    def blocks(self, log10_p: Singles, backoff: Singles, before: Ints, word: Ints) -> Iterator[bytes]:
+    def blocks(self, log10_p: Singles, backoff: Singles, weighted: Mask, before: Ints, word: Ints) -> Iterator[bytes]:
         """The same lines as PlainLines gives."""
-        split, weighted = 2 + self.contexts.shape[1], not np.isnan(backoff).all()
+        split, some_weighted = 2 + self.contexts.shape[1], bool(weighted.any())
         end = split + self.words.shape[1]
-        rows = np.empty((min(len(word), _BLOCK), end + 2 * weighted), _CELL)
+        rows = np.empty((min(len(word), _BLOCK), end + 2 * some_weighted), _CELL)
         for start in range(0, len(word), _BLOCK):
             block = slice(start, start + _BLOCK)
             row = rows[: len(word[block])]
@@ -73,8 +76,9 @@ class PackedLines:
             row[:, split:end] = self.words[word[block]]
             # In front of the first word.
             row.view(np.uint8)[:, 16] = ord("\t")
-            if weighted:
-                number_cells(backoff[block], "\t", row[:, end:])
+            if some_weighted:
+                number_cells(np.where(weighted[block], backoff[block], np.float32(0)), "\t", row[:, end:])
+                row[~weighted[block], end:] = 0
             yield row.tobytes().translate(None, b"\0")
 
     def longer(self, before: Ints, word: Ints) -> "PackedLines":
@@ -94,11 +98,11 @@ def first_lines(words: Sequence[str], encoding: str) -> PlainLines | PackedLines
 
 def _printed(values: Singles, lead: str) -> list[bytes]:
     numbers = np.where(np.isneginf(values), LOG_ZERO, values.astype(np.float64)).tolist()
-    return [b"" if number != number else f"{lead}{number:.7g}".encode() for number in numbers]
+    return [f"{lead}{number:.7g}".encode() for number in numbers]
 
 
 def number_cells(values: Singles, lead: str, cells: Cells) -> None:
-    """Write `lead` and '%.7g' of float32 values (m,) to `cells` (m, 2): LOG_ZERO for -inf, nothing for nan.
+    """Write `lead` and '%.7g' of float32 values (m,) to `cells` (m, 2): LOG_ZERO for -inf.
 
     Seven digits of a float32 between 1e-4 and 100 times a power of ten are a product that float64 holds exactly, so
     that `rint` rounds as printf does; other values are printed one by one.

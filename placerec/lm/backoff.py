@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.lm.logs import Singles
 from placerec.lm.trie import Ints, Trie
-
-Singles = NDArray[np.float32]
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Is a model right? Every context must sum to 1, and KenLM must give every word of any stream the same probability."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ SUM_TOLERANCE = 1e-5
 AGREEMENT_TOLERANCE = 2e-6
 # Both stand for log 0.
 LOG_ZERO = -90.0
+_LARGEST_POWER = 308
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,17 @@ def context_sums(model: BackoffModel) -> Iterator[tuple[int, NDArray[np.int64], 
         shorter = np.where(suffix >= 0, word_p[n - 2][suffix], _backed_off_p(model, n, suffix < 0))
         context_suffix = model.trie.suffixes[n - 2] if n > 2 else np.zeros(size, np.int64)
         shorter_total = np.where(context_suffix >= 0, total[context_suffix], 1.0)
-        weight = np.power(10.0, np.nan_to_num(model.backoffs[n - 2].astype(np.float64), nan=0.0, neginf=-np.inf))
+        with np.errstate(over="ignore"):
+            weight = np.power(10.0, np.nan_to_num(model.backoffs[n - 2].astype(np.float64), nan=0.0, neginf=-np.inf))
         seen = per_context(prefix, size, word_p[n - 1])
         total = seen + weight * (shorter_total - per_context(prefix, size, shorter))
         rows = np.flatnonzero(~np.isnan(model.backoffs[n - 2]) | (np.bincount(prefix, minlength=size) > 0))
         yield n, rows, total[rows]
+
+
+def power_of_ten(value: float) -> float:
+    """10 to the power of `value`; a file's weights may be beyond what float64 holds, which gives inf."""
+    return 10.0**value if value < _LARGEST_POWER else math.inf
 
 
 def _backed_off_p(model: BackoffModel, n: int, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -83,7 +91,7 @@ def _backed_off_p(model: BackoffModel, n: int, rows: NDArray[np.bool_]) -> NDArr
     texts = model.trie.texts(n) if rows.any() else []
     for row in np.flatnonzero(rows).tolist():
         words = texts[row].split(" ")
-        p[row] = 10 ** model.log10_p(words[-1], words[1:-1])
+        p[row] = power_of_ten(model.log10_p(words[-1], words[1:-1]))
     return p
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from placerec.errors import LanguageModelError
 from placerec.lm.counts import Mask, NgramCounts
-from placerec.lm.draft import EPSILON
+from placerec.lm.logs import EPSILON
 from placerec.lm.trie import Ints, per_context
 
 Floats = NDArray[np.float64]
@@ -101,6 +101,10 @@ def modified_kneser_ney_discounts(n1: int, n2: int, n3: int, n4: int) -> tuple[f
     return 1 - 2 * y * n2 / n1, 2 - 3 * y * n3 / n2, 3 - 4 * y * n4 / n3
 
 
+# The largest float64 that is an int64.
+_LARGEST = np.nextafter(2.0**63, 0)
+
+
 def recomputed(counts: NgramCounts) -> NgramCounts:
     """The counts with every n-gram that has extensions replaced by their sum (`-recompute`)."""
     values = list(counts.counts)
@@ -108,6 +112,8 @@ def recomputed(counts: NgramCounts) -> NgramCounts:
         seen = counts.seen[n - 1]
         prefix = counts.trie.prefix(n)[seen]
         sums = per_context(prefix, len(values[n - 2]), values[n - 1][seen].astype(np.float64))
+        if values[n - 2].dtype == np.int64:
+            sums = np.minimum(sums, _LARGEST)
         parents = np.bincount(prefix, minlength=len(values[n - 2])) > 0
         values[n - 2] = np.where(parents, sums.astype(values[n - 2].dtype), values[n - 2])
     return replace(counts, counts=tuple(values))

@@ -8,28 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.lm.backoff import BackoffModel, Singles
+from placerec.lm.backoff import BackoffModel
 from placerec.lm.gather import trie_of
+from placerec.lm.logs import EPSILON, Floats, Mask, Singles, log10, p_of
 from placerec.lm.trace import Trace
 from placerec.lm.trie import Ints, Trie, Vocabulary, build_trie, endings, per_context
-
-EPSILON = 3e-6
-LN10 = 2.30258509299404568402
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-
-def p_of(log10_p: Singles) -> Floats:
-    """Probabilities float64 of float32 log10 probabilities, by the specification's exp(x ln 10)."""
-    return np.exp(log10_p.astype(np.float64) * LN10)
-
-
-def log10(p: Floats) -> Singles:
-    """float32 log10 of float64 probabilities; -inf for 0."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.log10(p).astype(np.float32)
 
 
 @dataclass
@@ -96,7 +80,7 @@ class Draft:
                 rows = np.flatnonzero(shorter)
 
     def model(self) -> BackoffModel:
-        """The model without the rows that hold nothing."""
+        """The model without the rows that hold nothing; the prefixes of what is stored must be stored."""
         backoffs = [
             np.where(node, backoff, np.float32(np.nan)).astype(np.float32)[stored]
             for node, backoff, stored in zip(self.node, self.backoff, self.stored, strict=True)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placerec.lm.backoff import Singles
-from placerec.lm.draft import LN10, Floats, Mask, log10, p_of
+from placerec.lm.logs import LN10, Floats, Mask, Singles, log10, p_of
 from placerec.lm.trie import Ints
 
 

@@ -9,8 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from placerec.lm.backoff import Singles
-from placerec.lm.draft import Floats, p_of
+from placerec.lm.logs import Floats, Singles, p_of
 
 LONGEST = 50000
 

@@ -11,8 +11,8 @@ from placerec.errors import LanguageModelError
 from placerec.files import read_text
 from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.checks import context_sums
-from placerec.lm.counts import SENTENCE_START
+from placerec.lm.checks import context_sums, power_of_ten
+from placerec.lm.markers import SENTENCE_START
 
 
 def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:
             }
         )
     total = model.log10_p(word, history)
-    return {"word": word, "history": history, "log10_p": _finite(total), "p": 10**total, "steps": steps}
+    return {"word": word, "history": history, "log10_p": _finite(total), "p": power_of_ten(total), "steps": steps}
 
 
 def format_inspection(found: dict[str, Any]) -> str:

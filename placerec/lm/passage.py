@@ -6,13 +6,16 @@ The rule is that of section 6.8 of our SRILM specification, for all words of a t
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from placerec.lm.backoff import Singles
-from placerec.lm.draft import Draft, Mask
+from placerec.lm.logs import Mask, Singles
 from placerec.lm.row_index import RowIndex
 from placerec.lm.trie import Ints
+
+if TYPE_CHECKING:
+    from placerec.lm.draft import Draft
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Passage:
 class Reading:
     """Where a model finds the words of a passage: `rows[n-1]` (T,) of the n-gram that ends at each word, or -1."""
 
-    draft: Draft
+    draft: "Draft"
     first: Mask
     rows: list[Ints] = field(default_factory=list)
 
@@ -71,7 +74,7 @@ class Reading:
         return found
 
 
-def read_passage(draft: Draft, passage: Passage) -> Reading:
+def read_passage(draft: "Draft", passage: Passage) -> Reading:
     """Find the passage's n-grams in the model."""
     reading = Reading(draft, passage.first, [passage.ids])
     unlisted = np.flatnonzero(passage.ids < 0)
@@ -82,7 +85,7 @@ def read_passage(draft: Draft, passage: Passage) -> Reading:
     return reading
 
 
-def _find(draft: Draft, n: int, prefix: Ints, word: Ints) -> Ints:
+def _find(draft: "Draft", n: int, prefix: Ints, word: Ints) -> Ints:
     """Rows of order n (q,), -1 where there is none; `word` is listed wherever `prefix` is."""
     keys, V = draft.trie.keys[n - 1], len(draft.trie.vocabulary)
     if not len(keys) or 4 * len(word) < len(keys):
@@ -222,7 +225,7 @@ def joint(reading: Reading, passage: Passage, length: int, silent: Mask, *, star
     return total
 
 
-def joint_of_rows(draft: Draft, n: int, *, start: int, end: int) -> Singles:
+def joint_of_rows(draft: "Draft", n: int, *, start: int, end: int) -> Singles:
     """The same for the words of every row of order n: log10 of their joint probability, float32 (m_n,).
 
     `start` and `end` are the word numbers of <s> and </s>, -1 if not listed; the backed-off values must be fresh.

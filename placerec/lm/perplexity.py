@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placerec.lm.backoff import BackoffModel, Singles, score_ids
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
-from placerec.lm.draft import EPSILON, LN10, Floats, Mask
+from placerec.lm.backoff import BackoffModel, score_ids
+from placerec.lm.logs import EPSILON, LN10, Floats, Mask, Singles
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.trie import Ints
 
 TOP_RANKS = (1, 5, 10)
@@ -74,28 +74,29 @@ def measure(model: BackoffModel, sentences: Iterable[Iterable[str]]) -> Totals:
 
 def tally(log10_p: Singles, unknown: Mask, *, ended: bool) -> Totals:
     """The totals of one sentence's words: `log10_p` float32 (T,), `unknown` bool (T,); `ended`: the last is </s>."""
-    (row,) = tally_sentences(log10_p, unknown, np.zeros(len(log10_p), np.int64), np.array([ended]))
+    T = len(log10_p)
+    (row,) = tally_sentences(log10_p, unknown, np.ones(T, bool), np.array([T]), np.array([ended]))
     return Totals(*row.tolist())
 
 
-def tally_sentences(log10_p: Singles, unknown: Mask, sentence: Ints, ended: Mask) -> Floats:
+def tally_sentences(log10_p: Singles, unknown: Mask, scored: Mask, lengths: Ints, ended: Mask) -> Floats:
     """The same sentence by sentence, float64 (S, 5), columns as the fields of Totals.
 
-    `sentence` int64 (T,): the number of each word's sentence; `ended` bool (S,): its last word is the sentence's end.
+    `scored` bool (T,): the words that count; `lengths` int64 (S,); `ended` bool (S,): the last word is the end.
     """
-    size = len(ended)
-    zero = np.isneginf(log10_p)
-    ends = ended.astype(np.float64)
-    return np.stack(
-        [
-            ends,
-            np.bincount(sentence, minlength=size) - ends,
-            np.bincount(sentence[zero & unknown], minlength=size),
-            np.bincount(sentence[zero & ~unknown], minlength=size),
-            np.bincount(sentence[~zero], weights=log10_p[~zero].astype(np.float64), minlength=size),
-        ],
-        axis=1,
-    )
+    some = np.flatnonzero(lengths)
+    starts = (np.cumsum(lengths) - lengths)[some]
+    zero = scored & (log10_p == -np.inf)
+    columns = [scored, None, None, np.where(scored & ~zero, log10_p, np.float32(0))]
+    if zero.any():
+        columns[1:3] = [zero & unknown, zero & ~unknown]
+    totals = np.zeros((len(lengths), 5))
+    totals[:, 0] = ended
+    for k, column in enumerate(columns, start=1):
+        if column is not None and len(some):
+            totals[some, k] = np.add.reduceat(column, starts, dtype=np.float64)
+    totals[:, 1] -= ended
+    return totals
 
 
 @dataclass(frozen=True)

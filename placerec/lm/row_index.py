@@ -10,7 +10,7 @@ _SLOTS_PER_KEY = 4
 
 
 class RowIndex:
-    """Finds the places of numbers in `keys`, distinct int64 (m,) >= 0."""
+    """Finds the places of numbers in `keys`, int64 (m,) >= 0; `distinct`: none of them is there twice."""
 
     def __init__(self, keys: Ints) -> None:
         self._keys = keys
@@ -20,20 +20,24 @@ class RowIndex:
         slot = self._slot(keys)
         # Of several keys for one slot the last is kept; those that lost it go to a table of their own.
         self._slots[slot] = np.arange(len(keys))
-        self._lost = np.flatnonzero(self._slots[slot] != np.arange(len(keys)))
+        winner = self._slots[slot]
+        self._lost = np.flatnonzero(winner != np.arange(len(keys)))
         self._contested = np.zeros(1 << bits, bool)
         self._contested[slot[self._lost]] = True
         self._rest = RowIndex(keys[self._lost]) if len(self._lost) else None
+        again = bool((keys[winner[self._lost]] == keys[self._lost]).any())
+        self.distinct: bool = not again and (self._rest is None or self._rest.distinct)
 
-    def _slot(self, keys: Ints) -> NDArray[np.uint64]:
-        return keys.view(np.uint64) * _FACTOR >> self._shift
+    def _slot(self, keys: Ints) -> Ints:
+        slot: Ints = (keys.view(np.uint64) * _FACTOR >> self._shift).view(np.int64)
+        return slot
 
     def find(self, wanted: Ints) -> Ints:
-        """The place of each of `wanted` int64 (q,), -1 where it is none of the keys."""
+        """The place of each of `wanted` int64 (q,), -1 where it is none of the keys; of equal keys one of them."""
         if not len(self._keys):
             return np.full(len(wanted), -1, np.int64)
         slot = self._slot(wanted)
-        place = self._slots[slot].astype(np.int64)
+        place: NDArray[np.int64] = self._slots[slot].astype(np.int64)
         missed = np.flatnonzero(self._keys[place] != wanted)
         place[missed] = -1
         if self._rest is not None:

@@ -3,14 +3,8 @@
 Contexts of order n are given as rows of order n-1 (row 0 stands for the empty context where n is 1).
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
+from placerec.lm.logs import Floats, Mask, Singles
 from placerec.lm.trie import Ints
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 
 class Trace:

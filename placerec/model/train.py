@@ -28,7 +28,7 @@ from placerec.lm import (
     with_unigrams,
     write_arpa,
 )
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
 from placerec.model.corpus import VOCABULARY, read_corpus
 from placerec.model.record import NO_RECORD, Record, describe_record

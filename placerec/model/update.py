@@ -16,7 +16,8 @@ from placerec.files import held_folder, read_text, restore_folder, whole_folder
 from placerec.frames.places import check_twins
 from placerec.lm import NgramCounts, count_ngrams
 from placerec.lm.count_sums import read_counts, subtract_counts
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, add_counts
+from placerec.lm.counts import add_counts
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.trie import Vocabulary
 from placerec.model.corpus import VOCABULARY, Corpus, check_dictionary, holds_sentences, read_corpus, stream_files
 from placerec.model.load import read_description

@@ -5,24 +5,23 @@ not handled here: `parse_block` gives None, and the reader goes the long way, li
 """
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.backoff import Singles
-from placerec.lm.draft import Floats, Mask
+from placerec.lm.logs import Floats, Mask, Singles
 from placerec.lm.trie import Ints
-from placerec.srilm.fields import LONGEST_NAME, PADDING, Fields, NameTable, split_lines, unusual
+from placerec.srilm.fields import LONGEST_NAME, PADDING, Fields, Packed, split_lines, with_odd_bytes
 
 LOG_ZERO = -99.0
 _NUMBER = re.compile(rb"-?\d+(\.\d*)?([eE][-+]?\d+)?")
 
 
-@dataclass(frozen=True)
-class Block:
-    """N-grams of one order: line numbers (m,), words as SRILM's numbers (m, n), log10 p (m,), weights (m,).
+class Block(NamedTuple):
+    """N-grams of one order: line numbers (m,) from 1, words as SRILM's numbers (m, n), log10 p (m,), weights (m,).
 
-    `weighted` bool (m,): the line has a weight.
+    `weighted` bool (m,): the line has a weight. `size`: how many lines there are, empty ones too.
     """
 
     lines: Ints
@@ -30,53 +29,97 @@ class Block:
     log10_p: Singles
     weighted: Mask
     backoff: Singles
+    size: int = 0
 
 
-def parse_block(data: bytes, n: int, first_line: int, names: NameTable, *, weights: str) -> Block | None:
+def parse_block(data: bytes, n: int, numbered: Callable[[Fields, Ints], Ints], *, weights: str) -> Block | None:
     """The n-grams of order n in whole lines; None if there is anything unusual about them.
 
-    `weights`: `read` them; `ignore` them; or, at the file's highest order, let only `zero` pass.
+    `numbered`: gives the numbers of fields that are words, -1 for a word that is not listed. `weights`: `read` them;
+    `ignore` them; or, at the file's highest order, let only `zero` pass.
     """
-    if unusual(data):
+    if with_odd_bytes(data):
         return None
-    fields, count = split_lines(data + PADDING, len(data))
-    lines = np.flatnonzero(count)
-    count = count[lines]
-    if not ((count == n + 1) | (count == n + 2)).all():
+    fields, physical = split_lines(data + PADDING, len(data))
+    lines = np.flatnonzero(physical)
+    count = physical[lines]
+    weighted = count == n + 2
+    if not (weighted | (count == n + 1)).all():
         return None
     begin = np.cumsum(count) - count
-    weighted = count == n + 2
-    log10_p = _numbers(fields, begin, least=-np.inf, most=0.0)
+    log10_p = _numbers(fields, begin, most=0.0)
     backoff = _weights(fields, begin[weighted] + n + 1, weights)
     if log10_p is None or backoff is None:
         return None
-    words = np.stack([names.find(fields, begin + k) for k in range(1, n + 1)], axis=1)
+    words = numbered(fields, (begin[:, None] + np.arange(1, n + 1)).ravel())
     if (words < 0).any():
         return None
     every = np.zeros(len(lines), np.float32)
     every[weighted] = backoff
-    return Block(lines + first_line, words, log10_p, weighted, every)
+    words = words.reshape(-1, n)
+    return Block(lines + 1, words, log10_p, weighted, every, len(physical))
 
 
 def _weights(fields: Fields, at: Ints, what: str) -> Singles | None:
     if what == "read":
-        return _numbers(fields, at, least=-np.inf, most=np.inf)
+        return _numbers(fields, at, most=np.inf)
     first = np.frombuffer(fields.data, np.uint8)[fields.starts[at]]
     return None if what == "zero" and (first != ord("0")).any() else np.zeros(len(at), np.float32)
 
 
-def _numbers(fields: Fields, at: Ints, *, least: float, most: float) -> Singles | None:
-    """The numbers in the fields `at`, -inf for -99, or None if one is unusual or beyond the limits."""
-    value, plain = _decimals(fields, at)
-    for i in np.flatnonzero(~plain).tolist():
-        text = fields.text(int(at[i]))
-        if not _NUMBER.fullmatch(text):
-            return None
-        value[i] = float(text)
-    if not ((value >= least) & (value <= most) & np.isfinite(value)).all():
+def _numbers(fields: Fields, at: Ints, *, most: float) -> Singles | None:
+    """The numbers in the fields `at`, -inf for -99, or None if one is unusual, infinite, or above the limit."""
+    value, plain = _short_decimals(fields, at)
+    if not plain.all():
+        longer = np.flatnonzero(~plain)
+        value[longer], plain = _decimals(fields, at[longer])
+        for i in longer[~plain].tolist():
+            text = fields.text(int(at[i]))
+            if not _NUMBER.fullmatch(text):
+                return None
+            value[i] = float(text)
+    if not (np.isfinite(value) & (value <= most)).all():
         return None
     single = value.astype(np.float32)
-    return np.where(single == LOG_ZERO, np.float32(-np.inf), single)
+    single[single == LOG_ZERO] = -np.inf
+    return single
+
+
+def _every_byte(value: int) -> np.uint64:
+    return np.uint64(value * 0x0101010101010101)
+
+
+_ZEROS = _every_byte(ord("0"))
+_BEHIND_NINE, _HIGH_BITS = _every_byte(0x80 - 10), _every_byte(0x80)
+_EVERY_FOURTH = np.uint64(0x000000FF000000FF)
+_HUNDREDS, _MILLIONS = np.uint64((1000000 << 32) + 100), np.uint64((10000 << 32) + 1)
+_FILLED = np.array([(1 << 8 * size) - 1 for size in range(9)], np.uint64)
+_SIGN, _POINT = ord("-"), ord(".")
+
+
+def _short_decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
+    """Numbers of one digit, a point and up to eight digits, correctly rounded; and which of the fields are that."""
+    start = fields.starts[at]
+    bytes_ = np.frombuffer(fields.data, np.uint8)
+    negative = bytes_[start] == _SIGN
+    start += negative
+    size = fields.lengths[at] - negative - 2
+    whole = bytes_[start] - np.uint8(ord("0"))
+    digits, plain = _eight_digits(fields.eights.take(start + 2), _FILLED[np.clip(size, 0, 8)])
+    plain &= (whole <= 9) & (bytes_[start + 1] == _POINT) & (size >= 0) & (size <= 8)
+    # Both are exact, so that the quotient is the float64 nearest to the decimal number.
+    value = (whole * np.int64(10**8) + digits) / 1e8
+    return np.where(negative, -value, value), plain
+
+
+def _eight_digits(text: Packed, filled: Packed) -> tuple[Ints, Mask]:
+    """The numbers that eight bytes spell, zeros behind what is `filled`; and whether these are digits."""
+    digit = (text & filled | _ZEROS & ~filled) - _ZEROS
+    plain = (digit | digit + _BEHIND_NINE) & _HIGH_BITS == 0
+    # Pairs of digits, then fours, then all eight at once.
+    pairs = digit * np.uint64(10) + (digit >> np.uint64(8))
+    number = (pairs & _EVERY_FOURTH) * _HUNDREDS + (pairs >> np.uint64(16) & _EVERY_FOURTH) * _MILLIONS
+    return (number >> np.uint64(32)).view(np.int64), plain
 
 
 def _decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
@@ -86,11 +129,11 @@ def _decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     digits = np.zeros(len(at), np.int64)
     behind = np.zeros(len(at), np.int64)
     points = np.zeros(len(at), np.int64)
-    negative = (low & np.uint64(255)) == ord("-")
-    plain = (length > 1) & (length <= LONGEST_NAME)
+    negative = (low & np.uint64(255)) == _SIGN
+    plain = length <= LONGEST_NAME
     for j in range(min(LONGEST_NAME, int(length.max(initial=0)))):
         byte = ((low if j < 8 else high) >> np.uint64(8 * (j % 8)) & np.uint64(255)).astype(np.int64)
-        point = byte == ord(".")
+        point = byte == _POINT
         digit = byte - ord("0")
         numeral = (digit >= 0) & (digit <= 9)
         digits = np.where(numeral, digits * 10 + digit, digits)
@@ -98,7 +141,7 @@ def _decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
         points += point
         plain &= numeral | point | (j >= length) | (negative if j == 0 else False)
     plain &= (points <= 1) & (length - points - negative > 0)
-    # Both are exact, so that the quotient is the float64 nearest to the decimal number.
+    # As above.
     value = digits / _TENS[behind]
     return np.where(negative, -value, value), plain
 

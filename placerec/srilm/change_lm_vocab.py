@@ -4,14 +4,14 @@ import re
 from collections.abc import Sequence
 from io import BytesIO
 
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.srilm.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.vocabulary import WordList, read_words
 
 TOOL = "change-lm-vocab"
 USAGE = "usage: {tool} -vocab FILE [-lm FILE] [-write-lm FILE] [-subset] [-tolower] [options of ngram]"
-_HEADER = re.compile(r"ngram\s*(\d+)\s*=\s*\d+")
-_SECTION = re.compile(r"\\(\d+)-grams")
+_HEADER = re.compile(r"ngram\s*(\d{1,18})\s*=\s*\d+", re.ASCII)
+_SECTION = re.compile(r"\\(\d{1,18})-grams", re.ASCII)
 
 
 @exit_status

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from placerec.lm.counts import SENTENCE_END
-from placerec.lm.draft import Floats, p_of
+from placerec.lm.logs import Floats, p_of
+from placerec.lm.markers import SENTENCE_END
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals
 from placerec.lm.trie import Ints

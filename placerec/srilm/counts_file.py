@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from placerec.lm.counts import NgramCounts, tabulate
-from placerec.srilm.options import leading_float
+from placerec.srilm.options import bounded_int, leading_float
 from placerec.srilm.streams import Streams, tokens
 from placerec.srilm.vocabulary import WordList
 
@@ -19,9 +19,9 @@ def parse_count(text: str, fractional: bool, *, most: int = 2**63 - 1) -> float 
     """The count at the start of a text, as C's scanf reads it (%lu or %lf); None if there is none."""
     if fractional:
         return leading_float(text)
-    match = re.match(r"\+?(\d+)", text)
+    match = re.match(r"\+?([0-9]+)", text)
     # SRILM's integers end at 2^64 - 1, numpy's at 2^63 - 1.
-    return min(int(match[1]), most) if match else None
+    return bounded_int(match[1], most=most) if match else None
 
 
 @dataclass

@@ -1,7 +1,7 @@
 """The fields of many lines at once, and the numbers of the words among them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,36 +9,48 @@ from numpy.typing import NDArray
 from placerec.lm.trie import Ints
 
 Packed = NDArray[np.uint64]
-LONGEST_NAME = 16
+SHORT_NAME, LONGEST_NAME = 8, 16
 PADDING = b"\n" * 24
-_UNUSUAL = (b"\0", b"\v", b"\f", b"\n##")
-_BYTES = np.array([(1 << 8 * size) - 1 for size in range(9)], np.uint64)
+_ODD_BYTES = (b"\0", b"\v", b"\f")
+_TAB, _LINE_END, _RETURN, _BLANK = b"\t\n\r "
+_COMMENT = np.uint64(int.from_bytes(b"##", "little"))
+_TWO_BYTES = np.uint64(0xFFFF)
+# The bytes of a number that a field of so many bytes fills.
+_FILLED = np.array([(1 << 8 * size) - 1 for size in range(SHORT_NAME + 1)], np.uint64)
+
+
+def with_odd_bytes(data: bytes) -> bool:
+    """Whether lines hold bytes that have a meaning of their own: NUL, VT, FF."""
+    return any(odd in data for odd in _ODD_BYTES)
 
 
 def unusual(data: bytes) -> bool:
-    """Whether lines hold bytes that have a meaning of their own (NUL, VT, FF) or comments: they go line by line."""
-    return data.startswith(b"##") or any(text in data for text in _UNUSUAL)
+    """Whether lines hold such bytes, or comments: they go line by line."""
+    # One byte is found much faster than several.
+    return with_odd_bytes(data) or (b"#" in data and (data.startswith(b"##") or b"\n##" in data))
 
 
-@dataclass(frozen=True)
 class Fields:
     """The fields of a block of lines: where they start and how long they are, (f,); `data` is padded."""
 
-    data: bytes = field(repr=False)
-    starts: Ints
-    lengths: Ints
+    def __init__(self, data: bytes, starts: Ints, lengths: Ints) -> None:
+        self.data, self.starts, self.lengths = data, starts, lengths
 
     def text(self, at: int) -> bytes:
         """Field number `at`."""
         start = int(self.starts[at])
         return self.data[start : start + int(self.lengths[at])]
 
+    @cached_property
+    def eights(self) -> Packed:
+        """Eight bytes from every place on as one number, uint64."""
+        return np.ndarray((len(self.data) - 7,), "<u8", self.data, strides=(1,))
+
     def packed(self, at: Ints) -> tuple[Packed, Packed]:
         """The first 16 bytes of the fields `at` as two numbers each."""
-        every = np.ndarray((len(self.data) - 7,), "<u8", self.data, strides=(1,))
         start, length = self.starts[at], self.lengths[at]
-        low = every[start] & _BYTES[np.minimum(length, 8)]
-        high = every[start + 8] & _BYTES[np.clip(length - 8, 0, 8)]
+        low = self.eights[start] & _FILLED[np.minimum(length, SHORT_NAME)]
+        high = self.eights[start + SHORT_NAME] & _FILLED[np.clip(length - SHORT_NAME, 0, SHORT_NAME)]
         return low, high
 
 
@@ -47,68 +59,122 @@ def split_lines(data: bytes, size: int) -> tuple[Fields, Ints]:
 
     `data`: the lines, `size` bytes, and PADDING behind them.
     """
-    buffer = np.frombuffer(data, np.uint8, size + 1)
-    blank = (buffer == 32) | (buffer == 9) | (buffer == 10) | (buffer == 13)
-    edges = np.flatnonzero(blank[1:] != blank[:-1]) + 1
-    if not blank[0]:
-        edges = np.concatenate([[0], edges])
+    if size and data[size - 1] != _LINE_END:
+        size += 1
+    buffer = np.frombuffer(data, np.uint8, size)
+    at = np.flatnonzero(buffer <= _BLANK)
+    return _single_blanks(data, at, buffer[at]) or _any_blanks(data, buffer)
+
+
+def _single_blanks(data: bytes, at: Ints, kind: NDArray[np.uint8]) -> tuple[Fields, Ints] | None:
+    """The same where one separator stands behind every field, as programs write lines; `kind` (f,) `at` places (f,)."""
+    lengths = np.diff(at, prepend=-1) - 1
+    line_end = kind == _LINE_END
+    if (lengths == 0).any() or not (line_end | (kind == _BLANK) | (kind == _TAB)).all():
+        return None
+    return Fields(data, at - lengths, lengths), np.diff(np.flatnonzero(line_end), prepend=-1)
+
+
+def _any_blanks(data: bytes, buffer: NDArray[np.uint8]) -> tuple[Fields, Ints]:
+    line_end = buffer == _LINE_END
+    blank = np.ones(len(buffer) + 1, bool)
+    blank[1:] = line_end | (buffer == _BLANK) | (buffer == _TAB) | (buffer == _RETURN)
+    edges = np.flatnonzero(blank[1:] != blank[:-1])
     starts, stops = edges[::2], edges[1::2]
-    line_ends = np.flatnonzero(buffer == 10)
-    through = np.searchsorted(starts, line_ends)
+    through = np.searchsorted(starts, np.flatnonzero(line_end))
     return Fields(data, starts, stops - starts), np.diff(through, prepend=0)
 
 
+def without_comments(fields: Fields, count: Ints) -> tuple[Fields, Ints]:
+    """The same without the fields of lines that start with ##."""
+    begin = (np.cumsum(count) - count)[count > 0]
+    start = fields.starts[begin]
+    comment = fields.eights[start] & _TWO_BYTES == _COMMENT
+    if not comment.any():
+        return fields, count
+    buffer = np.frombuffer(fields.data, np.uint8)
+    comment &= (start == 0) | (buffer[start - 1] == _LINE_END)
+    commented = np.zeros(len(count), bool)
+    commented[count > 0] = comment
+    kept = ~np.repeat(commented, count)
+    return Fields(fields.data, fields.starts[kept], fields.lengths[kept]), np.where(commented, 0, count)
+
+
 class NameTable:
-    """Word numbers by name, for many names at once: a table of hashed names of up to 16 bytes, the rest one by one."""
+    """Word numbers by name, for many names at once: tables of hashed names of up to 16 bytes, the rest one by one."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self.index = index
         self.size = len(index)
-        short = [(name.encode("latin-1"), number) for name, number in index.items() if len(name) <= LONGEST_NAME]
-        packed = np.array([name for name, _ in short], "S16").view(np.uint64).reshape(-1, 2)
-        self.table = _HashedNames(
-            packed[:, 0].copy(), packed[:, 1].copy(), np.array([number for _, number in short], np.int64)
-        )
+        named = [(name.encode("latin-1"), number) for name, number in index.items() if len(name) <= LONGEST_NAME]
+        packed = np.array([name for name, _ in named], f"S{LONGEST_NAME}").view("<u8").reshape(-1, 2)
+        numbers = np.array([number for _, number in named], np.int64)
+        short = packed[:, 1] == 0
+        self.short = _HashedNames(packed[short, 0], packed[short, 1], numbers[short])
+        self.long = _HashedNames(packed[~short, 0], packed[~short, 1], numbers[~short])
 
-    def find(self, fields: Fields, at: Ints) -> Ints:
+    def find(self, fields: Fields, at: Ints | slice) -> Ints:
         """The numbers of the fields `at` (m,), -1 for a name that is not listed."""
-        if not len(at):
-            return np.zeros(0, np.int64)
-        number = self.table.find(*fields.packed(at))
+        start, length = fields.starts[at], fields.lengths[at]
+        long = length > SHORT_NAME
+        if not long.any():
+            return self.short.find_short(fields.eights.take(start) & _FILLED[length])
+        number = self.short.find_short(fields.eights.take(start) & _FILLED[np.minimum(length, SHORT_NAME)])
+        number[long] = self._find_long(fields, np.arange(len(fields.starts))[at][long])
+        return number
+
+    def _find_long(self, fields: Fields, at: Ints) -> Ints:
+        number = self.long.find(*fields.packed(at))
         for i in np.flatnonzero(fields.lengths[at] > LONGEST_NAME).tolist():
             number[i] = self.index.get(fields.text(int(at[i])).decode("latin-1"), -1)
         return number
+
+
+_MIX_LOW, _MIX_HIGH = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xC2B2AE3D27D4EB4F)
+# Few names are given more room: it is cheap, and fewer of them are after the same slot.
+_ROOMY_BITS, _ROOMY, _SLOTS_PER_NAME = 15, 32, 4
 
 
 class _HashedNames:
     """Numbers (m,) by names of 16 bytes, as two numbers each."""
 
     def __init__(self, low: Packed, high: Packed, numbers: Ints) -> None:
-        self.low, self.high, self.numbers = low, high, numbers
-        bits = max(8, int(8 * len(low)).bit_length())
+        least, roomy = (max(8, (slots * len(low)).bit_length()) for slots in (_SLOTS_PER_NAME, _ROOMY))
+        bits = max(least, min(roomy, _ROOMY_BITS))
         self.shift = np.uint64(64 - bits)
-        self.slots = np.full(1 << bits, -1, np.int32)
-        slot, entry = self._slot(low, high), np.arange(len(low))
+        self.low, self.high = np.zeros(1 << bits, np.uint64), np.zeros(1 << bits, np.uint64)
+        self.number = np.full(1 << bits, -1)
+        slot = self._slot(low, high)
         # Of several names for one slot the last is kept; those that lost it go to a table of their own.
-        self.slots[slot] = entry
-        lost = np.flatnonzero(self.slots[slot] != entry)
+        self.number[slot], self.low[slot], self.high[slot] = numbers, low, high
+        lost = (self.low[slot] != low) | (self.high[slot] != high)
         self.contested = np.zeros(1 << bits, bool)
         self.contested[slot[lost]] = True
-        self.rest = _HashedNames(low[lost], high[lost], numbers[lost]) if len(lost) else None
+        self.rest = _HashedNames(low[lost], high[lost], numbers[lost]) if lost.any() else None
 
-    def _slot(self, low: Packed, high: Packed) -> Packed:
-        mixed = low * np.uint64(0x9E3779B97F4A7C15) ^ high * np.uint64(0xC2B2AE3D27D4EB4F)
-        slot: Packed = (mixed ^ mixed >> np.uint64(29)) * np.uint64(0xBF58476D1CE4E5B9) >> self.shift
+    def _slot(self, low: Packed, high: Packed | None) -> Ints:
+        mixed = low * _MIX_LOW if high is None else low * _MIX_LOW ^ high * _MIX_HIGH
+        slot: Ints = ((mixed ^ mixed >> np.uint64(32)) * np.uint64(0xBF58476D1CE4E5B9) >> self.shift).view(np.int64)
         return slot
 
     def find(self, low: Packed, high: Packed) -> Ints:
         """The number of each name, -1 where it is not listed."""
+        return self._find(low, high)
+
+    def find_short(self, low: Packed) -> Ints:
+        """The same for names of up to eight bytes, in a table without others."""
+        return self._find(low, None)
+
+    def _find(self, low: Packed, high: Packed | None) -> Ints:
         slot = self._slot(low, high)
-        entry = self.slots[slot]
-        number = self.numbers[entry]
-        missed = np.flatnonzero((self.low[entry] != low) | (self.high[entry] != high))
-        number[missed] = -1
-        if self.rest is not None:
-            missed = missed[self.contested[slot[missed]]]
-            number[missed] = self.rest.find(low[missed], high[missed])
+        number = self.number[slot]
+        missed = self.low[slot] != low
+        if high is not None:
+            missed |= self.high[slot] != high
+        if missed.any():
+            missed = np.flatnonzero(missed)
+            number[missed] = -1
+            if self.rest is not None:
+                missed = missed[self.contested[slot[missed]]]
+                number[missed] = self.rest._find(low[missed], None if high is None else high[missed])
         return number

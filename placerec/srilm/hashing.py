@@ -8,7 +8,7 @@ All tables of a walk are filled at once: entries that come one after the other t
 one end up where they would if all asked at once, each slot kept its earliest claimant, and the others asked the next.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,17 +30,6 @@ def needed(entries: Ints) -> Ints:
 def capacities(entries: Ints) -> Ints:
     """The slots that tables have which were made for so many entries: powers of two, int64."""
     return 1 << np.ceil(np.log2(np.maximum(needed(entries), 1))).astype(np.int64)
-
-
-def name_keys(names: Iterable[str]) -> NDArray[np.uint64]:
-    """What the names of words (bytes as Latin-1) are hashed by, uint64."""
-    keys = []
-    for name in names:
-        key = 0
-        for byte in name.encode("latin-1"):
-            key = 9 * key + (byte if byte < 128 else byte - 256)
-        keys.append(key % 2**64)
-    return np.array(keys, np.uint64)
 
 
 def slot_order(keys: Sequence[int] | NDArray[np.uint64], size_hint: int = 0) -> list[int]:

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from placerec.lm.draft import LN10
-from placerec.lm.trace import Floats, Mask, Singles, Trace
+from placerec.lm.logs import LN10, Floats, Mask, Singles
+from placerec.lm.trace import Trace
 from placerec.lm.trie import Ints, Trie
 from placerec.srilm.streams import Streams
 

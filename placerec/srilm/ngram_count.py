@@ -9,7 +9,7 @@ from placerec.lm.count_statistics import recomputed
 from placerec.lm.counts import NgramCounts, add_counts, format_counts
 from placerec.lm.discounts import Rule
 from placerec.lm.draft import insert_prefixes
-from placerec.lm.estimate import estimate_draft
+from placerec.lm.estimation import estimate_draft
 from placerec.lm.prune import prune
 from placerec.srilm.counts_file import Table, read_counts
 from placerec.srilm.discounting import MODIFYING, Fitter, choose, given_method, meta_occurrences
@@ -89,7 +89,9 @@ OPTIONS: Options = {
 @exit_status
 def ngram_count(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
     """Run `ngram-count` with these arguments; returns the exit status."""
-    _run(parse(tool, OPTIONS, arguments, streams), streams)
+    # Real counts may be infinite: what comes of them is printed as it is.
+    with np.errstate(all="ignore"):
+        _run(parse(tool, OPTIONS, arguments, streams), streams)
     return 0
 
 

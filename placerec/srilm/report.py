@@ -1,21 +1,21 @@
 """What `ngram -ppl` and `ngram -counts` print: section 10 of our SRILM specification."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from placerec.lm.draft import Floats, Mask, p_of
+from placerec.lm.logs import Floats, Mask, p_of
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
 from placerec.lm.trie import Ints
 from placerec.srilm.scorers import Scored, Scorer, View, event_numbers
-from placerec.srilm.sentences import Handling, Sentences, mark, read_sentences
+from placerec.srilm.sentences import Handling, Sentences, joined, mark, read_sentences
 from placerec.srilm.streams import Streams
 from placerec.srilm.vocabulary import WordList
 
 TOKENS, SUMS, RANKS = 2, 3, 4
-_BATCH = 1 << 20
 
 
 def block(totals: Totals, ranks: Ranks | None = None) -> str:
@@ -59,10 +59,11 @@ class Printer:
     words: WordList
     streams: Streams
     debug: int
-    events: Ints = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.events = event_numbers(self.words)
+    @cached_property
+    def events(self) -> Ints:
+        """The words that can be predicted."""
+        return event_numbers(self.words)
 
     def name(self, number: int) -> str:
         """The word of a number."""
@@ -90,47 +91,37 @@ class Printer:
 
 
 def print_perplexity(name: str, scorer: Scorer, printer: Printer, handling: Handling, *, whole: bool) -> None:
-    """`-ppl`: score a text and print what `printer.debug` asks for; `whole`: no batches (a cache runs across them)."""
-    sentences = read_sentences(name, printer.words, handling, printer.streams)
-    passage, sentence, ended = mark(sentences, printer.words, handling)
-    summary = _Summary(printer, sentences)
-    first = 0
-    for start, stop in _batches(passage, whole):
-        part = Passage(passage.ids[start:stop], passage.first[start:stop], passage.scored[start:stop])
-        last = len(ended) if stop == len(passage.ids) else int(sentence[stop])
-        batch = _Batch(part, sentence[start:stop] - first, ended[first:last], sentences.weights[first:last])
-        summary.add(*_score_batch(scorer, printer, batch))
-        first = last
+    """`-ppl`: score a text and print what `printer.debug` asks for; `whole`: in one go (a cache runs on and on)."""
+    parts = read_sentences(name, printer.words, handling, printer.streams)
+    if whole:
+        parts = iter([joined(list(parts))])
+    summary = _Summary(printer)
+    for sentences in parts:
+        summary.add(sentences, *_score(scorer, printer, sentences, *mark(sentences, printer.words, handling)))
     summary.finish(name)
 
 
-def _batches(passage: Passage, whole: bool) -> Iterator[tuple[int, int]]:
-    """Where the passage is cut: between sentences."""
-    size = len(passage.ids)
-    starts = np.flatnonzero(passage.first)
-    following = np.searchsorted(starts, np.arange(0, 1 if whole else size, _BATCH))
-    cuts = starts[np.unique(following[following < len(starts)])].tolist() or [0]
-    yield from zip(cuts, [*cuts[1:], size], strict=True)
+def _score(
+    scorer: Scorer, printer: Printer, sentences: Sentences, passage: Passage, lengths: Ints, ended: Mask
+) -> tuple[Floats, list["_Line"]]:
+    """The totals of each sentence (S, 5), and what there is to print about its words."""
+    view = scorer.view(passage)
+    scored = view.score()
+    unknown = passage.ids == printer.words.index[printer.words.unknown]
+    totals = tally_sentences(scored.log10_p, unknown, passage.scored, lengths, ended) * sentences.weights[:, None]
+    if printer.debug < TOKENS:
+        return totals, [_Line() for _ in ended] if printer.debug else []
+    return totals, _token_lines(printer, view, scored, _Batch(passage, lengths, ended, sentences.weights))
 
 
 @dataclass(frozen=True)
 class _Batch:
-    """Sentences: their words, the sentence of each word (T,), and for each sentence whether it ends, and its weight."""
+    """Sentences: their words, and of each its length (S,), whether it ends in </s> (S,), and its weight (S,)."""
 
     part: Passage
-    sentence: Ints
+    lengths: Ints
     ended: Mask
     weights: Floats
-
-
-def _score_batch(scorer: Scorer, printer: Printer, batch: _Batch) -> tuple[Floats, dict[int, "_Line"]]:
-    """The totals of each sentence (S, 5), and what there is to print about its words."""
-    view = scorer.view(batch.part)
-    scored = view.score()
-    at = np.flatnonzero(batch.part.scored)
-    unknown = batch.part.ids[at] == printer.words.index[printer.words.unknown]
-    totals = tally_sentences(scored.log10_p[at], unknown, batch.sentence[at], batch.ended) * batch.weights[:, None]
-    return totals, _token_lines(printer, view, scored, batch) if printer.debug >= TOKENS else {}
 
 
 @dataclass
@@ -141,23 +132,29 @@ class _Line:
     ranks: Ranks = field(default_factory=Ranks)
 
 
-def _token_lines(printer: Printer, view: View, scored: Scored, batch: _Batch) -> dict[int, _Line]:
+def _token_lines(printer: Printer, view: View, scored: Scored, batch: _Batch) -> list[_Line]:
     part = batch.part
-    lines: dict[int, _Line] = {sentence: _Line() for sentence in range(len(batch.ended))}
+    lines = [_Line() for _ in batch.ended]
     at = np.flatnonzero(part.scored)
     begin = np.maximum.accumulate(np.where(part.first, np.arange(len(part.ids)), 0))
     # The first word of a sentence is marked by the lack of dots.
     opening = part.first[at] | ((at > 0) & part.first[at - 1] & ~part.scored[at - 1])
-    columns = (at, begin[at], batch.sentence[at], opening, scored.log10_p[at], p_of(scored.log10_p[at]))
+    sentence = np.repeat(np.arange(len(batch.lengths)), batch.lengths)[at]
+    columns = (at, begin[at], sentence, opening, scored.log10_p[at], p_of(scored.log10_p[at]))
     words = part.ids.tolist()
-    for t, start, sentence, opens, log10_p, p in zip(*(column.tolist() for column in columns), strict=True):
-        before = (printer.name(words[t - 1]) if t > start else "") + (" " if opens else " ...")
-        text = printer.token(words[t], before, scored.tag(t), p, log10_p)
-        line = lines[sentence]
+    # N-grams repeat, and printing numbers takes long.
+    printed: dict[tuple[int, int, bool, str, float], str] = {}
+    for t, start, i, opens, log10_p, p in zip(*(column.tolist() for column in columns), strict=True):
+        key = (words[t - 1] if t > start else -1, words[t], opens, scored.tag(t), log10_p)
+        text = printed.get(key)
+        if text is None:
+            before = (printer.name(key[0]) if t > start else "") + (" " if opens else " ...")
+            text = printed[key] = printer.token(words[t], before, key[3], p, log10_p)
+        line = lines[i]
         line.text.append(text + printer.sum(view, t, part.ids[start:t]) + "\n")
         if printer.debug >= RANKS:
             last = t + 1 == len(words) or bool(part.first[t + 1])
-            end, weight = bool(last and batch.ended[sentence]), float(batch.weights[sentence])
+            end, weight = bool(last and batch.ended[i]), float(batch.weights[i])
             line.ranks += printer.rank(view, t, words[t], log10_p, end=end, weight=weight)
     return lines
 
@@ -165,44 +162,34 @@ def _token_lines(printer: Printer, view: View, scored: Scored, batch: _Batch) ->
 class _Summary:
     """Prints sentence by sentence, group by group (between escaped lines), and at the end the whole."""
 
-    def __init__(self, printer: Printer, sentences: Sentences) -> None:
+    def __init__(self, printer: Printer) -> None:
         self.printer = printer
-        self.sentences = sentences
-        self.done = 0
         self.total = Totals()
         self.group = Totals()
         self.ranks = Ranks()
-        self.escapes = iter([*sentences.escapes, (1 << 62, "")])
-        self.next_escape, self.escaped = next(self.escapes)
+        self.started = False
         self.grouped = False
 
-    def add(self, totals: Floats, lines: dict[int, _Line]) -> None:
-        """Sentences' totals (S, 5), and what there is to print about their tokens."""
-        if self.printer.debug == 0 and not self.sentences.escapes:
-            self.done += len(totals)
-            self.total += Totals(*totals.sum(axis=0).tolist())
-            return
-        for i, row in enumerate(totals.tolist()):
-            self._escape()
-            self._sentence(Totals(*row), lines.get(i, _Line()))
-            self.done += 1
+    def add(self, sentences: Sentences, totals: Floats, lines: Sequence[_Line]) -> None:
+        """Sentences with their totals (S, 5), and what there is to print about their tokens."""
+        before = 0
+        for place, escaped in (*sentences.escapes, (len(totals), None)):
+            self._sentences(sentences.shown[before:place], totals[before:place], lines[before:place])
+            if escaped is not None:
+                if self.printer.debug == 0 and self.started:
+                    self._group()
+                self.printer.streams.print(escaped + "\n")
+            before = place
 
-    def _sentence(self, totals: Totals, line: _Line) -> None:
-        self.total += totals
-        self.group += totals
-        self.ranks += line.ranks
-        if self.printer.debug >= 1:
+    def _sentences(self, shown: Sequence[str], totals: Floats, lines: Sequence[_Line]) -> None:
+        self.started |= len(totals) > 0
+        whole = Totals(*totals.sum(axis=0).tolist())
+        self.total += whole
+        self.group += whole
+        for text, row, line in zip(shown, totals.tolist(), lines, strict=False):
+            self.ranks += line.ranks
             ranks = line.ranks if self.printer.debug >= RANKS else None
-            text = self.sentences.shown[self.done] + "\n" + "".join(line.text)
-            self.printer.streams.print(text + block(totals, ranks) + "\n")
-
-    def _escape(self) -> None:
-        """Copy the escaped lines that stand before the next sentence."""
-        while self.next_escape <= self.done:
-            if self.printer.debug == 0 and self.done > 0:
-                self._group()
-            self.printer.streams.print(self.escaped + "\n")
-            self.next_escape, self.escaped = next(self.escapes)
+            self.printer.streams.print(text + "\n" + "".join(line.text) + block(Totals(*row), ranks) + "\n")
 
     def _group(self) -> None:
         self.printer.streams.print(block(self.group) + "\n")
@@ -210,7 +197,6 @@ class _Summary:
 
     def finish(self, name: str) -> None:
         """What stands at the end of a file."""
-        self._escape()
         if self.grouped:
             self._group()
         ranks = self.ranks if self.printer.debug >= RANKS else None

@@ -4,25 +4,26 @@ Words are SRILM's numbers here. What is printed about each word (`[2gram]` and t
 specification.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from placerec.lm.backoff import Singles
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START
-from placerec.lm.draft import Draft, Mask, p_of
-from placerec.lm.dynamic import Cache, loglinear, mixed, posteriors, with_cache
-from placerec.lm.passage import Passage, answers, joint, look_up, look_up_others, read_passage, spread, used_context
+from placerec.lm.logs import Mask, Singles
+from placerec.lm.lookup import Lookup
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START
+from placerec.lm.passage import Passage, answers, joint, look_up, look_up_others, read_passage, spread
 from placerec.lm.trie import Ints
 from placerec.srilm.vocabulary import WordList
+
+if TYPE_CHECKING:
+    from placerec.lm.draft import Draft
 
 Tag = Callable[[int], str]
 
 
-@dataclass(frozen=True)
-class Scored:
+class Scored(NamedTuple):
     """log10 p float32 (T,) of words in their places, and what is printed before the probability of word t."""
 
     log10_p: Singles
@@ -85,17 +86,60 @@ class NullView:
         return np.zeros(self.V, np.float32)
 
 
-@dataclass(frozen=True)
+class LookupModel:
+    """A back-off model that was read for scoring only; its word numbers are those of `words`."""
+
+    def __init__(self, lookup: Lookup, words: WordList) -> None:
+        self.lookup, self.words = lookup, words
+
+    def view(self, passage: Passage) -> "LookupView":
+        """Read a passage."""
+        return LookupView(self, passage)
+
+
+class LookupView:
+    """A passage, read by a LookupModel."""
+
+    def __init__(self, model: LookupModel, passage: Passage) -> None:
+        self.model, self.lookup = model, model.lookup
+        self.digits = self.lookup.digits(passage.ids)
+        self.contexts = self.lookup.contexts(self.digits, np.flatnonzero(passage.first))
+
+    def score(self, words: Ints | None = None) -> Scored:
+        """The probabilities of the passage's words, or of others in their places."""
+        digits = self.digits if words is None else self.lookup.digits(words)
+        log10_p, answered = self.lookup.find(self.contexts, digits)
+        tags = ["[OOV]", *(f"[{n}gram]" for n in range(1, len(self.lookup.tables) + 1))]
+        return Scored(log10_p, lambda t: tags[answered[t]])
+
+    def spread(self, t: int) -> Singles:
+        """log10 p of every word."""
+        every = np.arange(len(self.model.words.words))
+        contexts = [np.full(len(every), codes[t]) for codes in self.contexts]
+        return self.lookup.find(contexts, self.lookup.digits(every))[0]
+
+
+@dataclass
 class Model:
     """A back-off model. `skipping`: probability 0 for unknown words and the two words behind them (-skipoovs)."""
 
-    draft: Draft
+    draft: "Draft"
     words: WordList
     skipping: bool = False
+    _own: Ints = field(default_factory=lambda: np.zeros(0, np.int64), init=False)
 
     def view(self, passage: Passage) -> "ModelView":
         """Read a passage."""
         return ModelView(self, passage)
+
+    @property
+    def own(self) -> Ints:
+        """The model's number of each of SRILM's numbers, -1 for what it does not list."""
+        if len(self._own) != len(self.words.words):
+            index = self.draft.trie.vocabulary.index
+            own = [-1 if word is None else index.get(word, -1) for word in self.words.words]
+            self._own = np.array(own, np.int64)
+        return self._own
 
 
 class ModelView:
@@ -103,10 +147,9 @@ class ModelView:
 
     def __init__(self, model: Model, passage: Passage) -> None:
         self.model = model
-        index = model.draft.trie.vocabulary.index
-        self.own = np.array([-1 if word is None else index.get(word, -1) for word in model.words.words], np.int64)
+        self.own = model.own
+        self.given = passage.ids
         self.passage = replace(passage, ids=self.own[passage.ids])
-        self.silent = ~event_mask(model.words)[passage.ids]
         self.reading = read_passage(model.draft, self.passage)
         self.unknown = model.words.index[model.words.unknown]
         self.near = np.zeros(len(passage.ids), bool)
@@ -145,212 +188,5 @@ class ModelView:
         """log10 of the joint probability of the last `length` words before each word, float32 (T,)."""
         index = self.model.draft.trie.vocabulary.index
         start, end = index.get(SENTENCE_START, -2), index.get(SENTENCE_END, -1)
-        return joint(self.reading, self.passage, length, self.silent, start=start, end=end)
-
-
-@dataclass(frozen=True)
-class Mixture:
-    """The mean of several models (-bayes), weighted by how well they predicted the last `length` words.
-
-    `detailed`: print the probabilities of the components.
-    """
-
-    models: Sequence[Model]
-    weights: Sequence[float]
-    length: int = 0
-    scale: float = 1.0
-    detailed: bool = False
-
-    def view(self, passage: Passage) -> "MixtureView":
-        """Read a passage."""
-        return MixtureView(self, [model.view(passage) for model in self.models])
-
-
-class MixtureView:
-    """A passage, read by the models of a Mixture."""
-
-    def __init__(self, mixture: Mixture, views: Sequence[ModelView]) -> None:
-        self.mixture = mixture
-        self.views = views
-        T = len(views[0].passage.ids)
-        if mixture.length > 0:
-            joints = np.stack([view.joint(mixture.length) for view in views])
-            self.posteriors = posteriors(mixture.weights, joints, mixture.scale)
-        else:
-            plain = np.array(mixture.weights, np.float64)
-            self.posteriors = np.repeat(plain[:, None] / plain.sum(), T, axis=1)
-
-    def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
-        parts = [view.score(words) for view in self.views]
-        log10_ps = np.stack([part.log10_p for part in parts])
-
-        def tag(t: int) -> str:
-            found = "".join(part.tag(t) for part in parts)
-            if self.mixture.length > 0:
-                found += "[post=" + ",".join(f"{weight:.7g}" for weight in self.posteriors[:, t]) + "]"
-            if self.mixture.detailed:
-                found += "[probs=" + ",".join(f"{p:.7g}" for p in p_of(log10_ps[:, t])) + "]"
-            return found
-
-        return Scored(mixed(log10_ps, self.posteriors), tag)
-
-    def spread(self, t: int) -> Singles:
-        """log10 p of every word."""
-        return mixed(np.stack([view.spread(t) for view in self.views]), self.posteriors[:, t])
-
-
-@dataclass(frozen=True)
-class LogLinear:
-    """The normalised product of powers of several models (-loglinear-mix)."""
-
-    models: Sequence[Model]
-    weights: Sequence[float]
-    words: WordList
-
-    def view(self, passage: Passage) -> "LogLinearView":
-        """Read a passage."""
-        return LogLinearView(self, passage, [model.view(passage) for model in self.models])
-
-
-class LogLinearView:
-    """A passage, read by the models of a LogLinear; normalisers are kept per context."""
-
-    def __init__(self, mixture: LogLinear, passage: Passage, views: Sequence[ModelView]) -> None:
-        self.mixture = mixture
-        self.passage = passage
-        self.views = views
-        self.events = event_numbers(mixture.words)
-        self.used = np.max([used_context(view.reading) for view in views], axis=0)
-        self.sums: dict[tuple[int, ...], float] = {}
-
-    def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
-        parts = [view.score(words) for view in self.views]
-        log10_p = loglinear(np.stack([part.log10_p for part in parts]), self.mixture.weights)
-        tags: dict[int, str] = {}
-        for t in np.flatnonzero(self.passage.scored).tolist():
-            known = self.context(t) in self.sums
-            total = self.total(t)
-            log_total = np.float32(np.log10(total)) if total > 0 else np.float32(-np.inf)
-            log10_p[t] -= log_total
-            tags[t] = f"[cached={float(p_of(np.array([log_total]))[0]):.7g}]" if known else f"[denom={total:.7g}]"
-
-        def tag(t: int) -> str:
-            # Once the product is 0 SRILM does not ask the models that are left.
-            zero = [bool(np.isneginf(part.log10_p[t])) for part in parts]
-            asked = zero.index(True) + 1 if any(zero) else len(parts)
-            return "".join(part.tag(t) for part in parts[:asked]) + tags[t]
-
-        return Scored(log10_p, tag)
-
-    def context(self, t: int) -> tuple[int, ...]:
-        """The words before word t that any of the models uses."""
-        return tuple(self.passage.ids[t - int(self.used[t]) : t].tolist())
-
-    def total(self, t: int) -> float:
-        """The sum over all words that the products at word t are divided by."""
-        context = self.context(t)
-        if context not in self.sums:
-            self.sums[context] = float(p_of(self._products(t)[self.events]).sum())
-        return self.sums[context]
-
-    def spread(self, t: int) -> Singles:
-        """log10 p of every word."""
-        with np.errstate(divide="ignore"):
-            return self._products(t) - np.float32(np.log10(self.total(t)))
-
-    def _products(self, t: int) -> Singles:
-        return loglinear(np.stack([view.spread(t) for view in self.views]), self.mixture.weights)
-
-
-@dataclass(frozen=True)
-class Cached:
-    """A scorer mixed with the shares of words among the last `size` that were predicted (-cache)."""
-
-    base: Scorer
-    words: WordList
-    size: int
-    weight: float
-
-    def view(self, passage: Passage) -> "CachedView":
-        """Read a passage."""
-        return CachedView(self, passage)
-
-
-class CachedView:
-    """A passage, read by what is below the cache; the cache holds what stands before each word."""
-
-    def __init__(self, cached: Cached, passage: Passage) -> None:
-        self.cached = cached
-        self.ids = passage.ids
-        self.base = cached.base.view(passage)
-        counted = passage.scored & (passage.ids != cached.words.index[cached.words.unknown])
-        self.cache = Cache(passage.ids, counted, cached.size)
-
-    def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
-        below = self.base.score(words)
-        unknown = self.cached.words.index[self.cached.words.unknown]
-        ids = self.ids if words is None else words
-        shares = self.cache.shares(ids)
-        log10_p = with_cache(below.log10_p, shares, self.cached.weight)
-        return Scored(log10_p, lambda t: below.tag(t) + (f"[cache={shares[t]:.7g}]" if ids[t] != unknown else ""))
-
-    def spread(self, t: int) -> Singles:
-        """log10 p of every word."""
-        below = self.base.spread(t)
-        return with_cache(below, self.cache.spread(t, len(below)), self.cached.weight)
-
-
-@dataclass(frozen=True)
-class Lenient:
-    """A scorer with a fixed log10 p for the unknown word (-unk-prob), and a word (-zeroprob-word) whose probability
-    stands in where another's is 0.
-    """
-
-    base: Scorer
-    words: WordList
-    unknown_p: float | None = None
-    stand_in: int | None = None
-
-    def view(self, passage: Passage) -> "LenientView":
-        """Read a passage."""
-        return LenientView(self, passage.ids, self.base.view(passage))
-
-
-@dataclass(frozen=True)
-class LenientView:
-    """A passage, read by the scorer below."""
-
-    lenient: Lenient
-    ids: Ints
-    base: View
-
-    def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
-        below = self.base.score(words)
-        ids = self.ids if words is None else words
-        log10_p = self._with_unknown(below.log10_p, ids)
-        stand_in = self.lenient.stand_in
-        if stand_in is None:
-            return Scored(log10_p, below.tag)
-        instead = np.isneginf(log10_p) & (ids != stand_in)
-        other = self.base.score(np.full(len(ids), stand_in, np.int64))
-        return Scored(
-            np.where(instead, other.log10_p, log10_p),
-            lambda t: below.tag(t) + (other.tag(t) if instead[t] else ""),
-        )
-
-    def spread(self, t: int) -> Singles:
-        """log10 p of every word."""
-        below = self.base.spread(t)
-        log10_p = self._with_unknown(below, np.arange(len(below)))
-        stand_in = self.lenient.stand_in
-        return log10_p if stand_in is None else np.where(np.isneginf(log10_p), below[stand_in], log10_p)
-
-    def _with_unknown(self, log10_p: Singles, ids: Ints) -> Singles:
-        if self.lenient.unknown_p is None:
-            return log10_p
-        unknown = ids == self.lenient.words.index[self.lenient.words.unknown]
-        return np.where(unknown, np.float32(self.lenient.unknown_p), log10_p)
+        silent = ~event_mask(self.model.words)[self.given]
+        return joint(self.reading, self.passage, length, silent, start=start, end=end)

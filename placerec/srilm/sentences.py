@@ -1,21 +1,24 @@
 """The text that `ngram -ppl` scores: lines to word numbers, with the markers that belong around them (section 10.1)."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START
-from placerec.lm.draft import Floats, Mask
+from placerec.lm.logs import Floats, Mask
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage
 from placerec.lm.trie import Ints
-from placerec.srilm.fields import PADDING, NameTable, split_lines, unusual
+from placerec.srilm.fields import PADDING, NameTable, split_lines, with_odd_bytes, without_comments
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import Lines, Streams, tokens
 from placerec.srilm.vocabulary import WordList
 
 LONGEST = 50000
 _NOTHING = -2
-_BLOCK = 1 << 18
+# Bytes read at once where lines are as programs write them, and words where they are not.
+_BLOCK, _BATCH = 1 << 19, 1 << 18
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,7 @@ class Handling:
     noise: frozenset[int] = frozenset()
 
 
-@dataclass
-class Sentences:
+class Sentences(NamedTuple):
     """Lines as SRILM's word numbers (T,), lengths (S,), weights (S,); `shown`: their words, if `verbose`.
 
     `escapes`: the number of the sentence that comes next, and the line.
@@ -45,49 +47,51 @@ class Sentences:
     numbers: Ints
     lengths: Ints
     weights: Floats
-    shown: list[str] = field(default_factory=list)
-    escapes: list[tuple[int, str]] = field(default_factory=list)
+    shown: Sequence[str] = ()
+    escapes: Sequence[tuple[int, str]] = ()
 
 
-def read_sentences(name: str, words: WordList, handling: Handling, streams: Streams) -> Sentences:
-    """Read a text; words that are not listed are the unknown word. Too long lines are reported and left out."""
+def read_sentences(name: str, words: WordList, handling: Handling, streams: Streams) -> Iterator[Sentences]:
+    """Read a text, many lines at a time; words that are not listed are the unknown word.
+
+    Too long lines are reported and left out.
+    """
     lines = streams.lines(name)
-    if handling.weight or handling.escape is not None or handling.verbose or unusual(lines.data):
+    if handling.weight or handling.escape is not None or handling.verbose or with_odd_bytes(lines.data):
         return _read_carefully(lines, words, handling, streams)
-    numbers, lengths = _read_quickly(lines.data, words)
-    used = (lengths > 0) & (lengths <= LONGEST)
-    for line in np.flatnonzero(lengths > LONGEST).tolist():
-        streams.say(f"{name}: line {line + 1}: too many words per sentence")
-    kept = numbers if used.sum() == (lengths > 0).sum() else numbers[np.repeat(used, lengths)]
-    return Sentences(kept, lengths[used], np.ones(int(used.sum())))
+    return _read_quickly(lines, words, streams)
 
 
-def _read_quickly(data: bytes, words: WordList) -> tuple[Ints, Ints]:
-    """Word numbers (T,), and how many there are in each physical line."""
-    names, unknown = NameTable(words.index), words.index[words.unknown]
-    numbers, lengths = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    start = 0
+def _read_quickly(lines: Lines, words: WordList, streams: Streams) -> Iterator[Sentences]:
+    data, names, unknown = lines.data, NameTable(words.index), words.index[words.unknown]
+    start = line = 0
     while start < len(data):
-        end = data.find(b"\n", min(len(data) - 1, start + _BLOCK)) + 1 or len(data)
+        end = data.find(b"\n", start + _BLOCK) + 1 or len(data)
         block = data[start:end].lower() if words.lower else data[start:end]
-        fields, counts = split_lines(block + PADDING, len(block))
-        found = names.find(fields, np.arange(len(fields.starts)))
-        numbers.append(np.where(found < 0, unknown, found))
-        lengths.append(counts)
-        start = end
-    return np.concatenate(numbers), np.concatenate(lengths)
+        fields, lengths = without_comments(*split_lines(block + PADDING, len(block)))
+        numbers = names.find(fields, slice(None))
+        numbers[numbers < 0] = unknown
+        too_long = lengths > LONGEST
+        if too_long.any():
+            for number in np.flatnonzero(too_long).tolist():
+                streams.say(f"{lines.name}: line {line + number + 1}: too many words per sentence")
+            numbers, lengths = numbers[~np.repeat(too_long, lengths)], np.where(too_long, 0, lengths)
+        used = lengths[lengths > 0]
+        yield Sentences(numbers, used, np.ones(len(used)))
+        start, line = end, line + len(lengths)
 
 
-def _read_carefully(lines: Lines, words: WordList, handling: Handling, streams: Streams) -> Sentences:
+def _read_carefully(lines: Lines, words: WordList, handling: Handling, streams: Streams) -> Iterator[Sentences]:
     index, unknown = words.index, words.index[words.unknown]
     numbers: list[int] = []
-    lengths: list[int] = []
-    weights: list[float] = []
-    shown: list[str] = []
+    kept: list[tuple[int, float, str]] = []
     escapes: list[tuple[int, str]] = []
     for line in lines:
+        if len(numbers) + len(kept) >= _BATCH:
+            yield _sentences(numbers, kept, escapes)
+            numbers, kept, escapes = [], [], []
         if handling.escape is not None and line.startswith(handling.escape):
-            escapes.append((len(lengths), line))
+            escapes.append((len(kept), line))
             continue
         found = tokens(line)
         weight = leading_float(found.pop(0 if handling.weight == "first" else -1)) if handling.weight and found else 1.0
@@ -97,17 +101,32 @@ def _read_carefully(lines: Lines, words: WordList, handling: Handling, streams: 
             streams.say(f"{lines.position}illegal count weight or line too long?")
         else:
             numbers += [index.get(words.normal(word), unknown) for word in found]
-            lengths.append(len(found))
-            weights.append(weight)
             mark = f"{weight:g}* " if handling.weight else ""
-            shown.append(mark + " ".join(found) if handling.verbose else "")
+            kept.append((len(found), weight, mark + " ".join(found) if handling.verbose else ""))
+    yield _sentences(numbers, kept, escapes)
+
+
+def _sentences(
+    numbers: Sequence[int], kept: Sequence[tuple[int, float, str]], escapes: Sequence[tuple[int, str]]
+) -> Sentences:
+    lengths, weights, shown = zip(*kept, strict=True) if kept else ((), (), ())
     return Sentences(
         np.array(numbers, np.int64), np.array(lengths, np.int64), np.array(weights, np.float64), shown, escapes
     )
 
 
+def joined(parts: Sequence[Sentences]) -> Sentences:
+    """All sentences in one."""
+    parts = [_sentences([], [], []), *parts]
+    before = np.cumsum([0, *(len(part.lengths) for part in parts)]).tolist()
+    numbers, lengths, weights = (np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True))
+    shown = [text for part in parts for text in part.shown]
+    escapes = [(b + number, line) for b, part in zip(before, parts, strict=False) for number, line in part.escapes]
+    return Sentences(numbers, lengths, weights, shown, escapes)
+
+
 def mark(sentences: Sentences, words: WordList, handling: Handling) -> tuple[Passage, Ints, Mask]:
-    """The passage to score, the sentence of each of its words (T,), and whether each sentence ends in </s> (S,)."""
+    """The passage to score, the lengths of its sentences (S,), and whether each of them ends in </s> (S,)."""
     start_number, end_number = words.index.get(SENTENCE_START, -1), words.index.get(SENTENCE_END, -1)
     numbers, size = sentences.numbers, len(sentences.lengths)
     stops = np.cumsum(sentences.lengths)
@@ -115,11 +134,10 @@ def mark(sentences: Sentences, words: WordList, handling: Handling) -> tuple[Pas
     padded = np.concatenate([numbers, [_NOTHING]])
     opened = some & (padded[np.where(some, stops - sentences.lengths, len(numbers))] == start_number)
     ended = some & (padded[np.where(some, stops - 1, len(numbers))] == end_number)
-    sentence = np.repeat(np.arange(size), sentences.lengths)
-    if handling.noise:
-        kept = ~np.isin(numbers, list(handling.noise))
-        numbers, sentence = numbers[kept], sentence[kept]
-    lengths = np.bincount(sentence, minlength=size)
+    lengths = sentences.lengths
+    if handling.noise and (noise := np.isin(numbers, list(handling.noise))).any():
+        lengths = np.bincount(np.repeat(np.arange(size), lengths)[~noise], minlength=size)
+        numbers = numbers[~noise]
     if handling.reverse:
         numbers = _reversed(numbers, lengths, opened, ended)
     before, after = (~opened & handling.start).astype(np.int64), (~ended & handling.end).astype(np.int64)
@@ -138,7 +156,7 @@ def mark(sentences: Sentences, words: WordList, handling: Handling) -> tuple[Pas
     has_end = np.zeros(size, bool)
     predicted = whole - (opened | (before > 0)) > 0
     has_end[predicted] = ids[(begin + whole - 1)[predicted]] == end_number
-    return Passage(ids, first, scored), np.repeat(np.arange(size), whole), has_end
+    return Passage(ids, first, scored), whole, has_end
 
 
 def _reversed(numbers: Ints, lengths: Ints, opened: Mask, ended: Mask) -> Ints:

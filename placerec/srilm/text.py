@@ -8,7 +8,8 @@ from itertools import chain
 import numpy as np
 
 from placerec.lm.ahead import work_ahead
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, NgramCounts, count_text
+from placerec.lm.counts import NgramCounts, count_text
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.stored_text import BLOCK, Numbers, StoredText
 from placerec.lm.trie import Ints
 from placerec.srilm.counts_file import parse_count

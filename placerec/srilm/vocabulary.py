@@ -3,7 +3,7 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.trie import Vocabulary
 from placerec.srilm.streams import Streams, tokens
 

@@ -72,6 +72,11 @@ def test_reader_is_as_strict_as_kenlm(shared: Path) -> None:
     [
         ("-0.5\ta", "0.5\ta", ":7: log10 probability 0.5 is above 0"),
         ("-0.5\ta", "x\ta", ":7: log10 probability 'x' is not a number"),
+        ("-0.5\ta", "-0_5\ta", ":7: log10 probability '-0_5' is not a number"),
+        ("-0.5\ta", "-\u0661\ta", ":7: log10 probability '-\u0661' is not a number"),
+        ("-0.5\ta", "\xa0-0.5\ta", ":7: log10 probability '\\xa0-0.5' is not a number"),
+        ("ngram 2=1", "ngram 2=\u0661", ":3: 'ngram 2=\u0661' found, 'ngram 2=COUNT' expected"),
+        ("ngram 2=1", "ngram 2=" + "1" * 5000, f":3: 'ngram 2={'1' * 32}' found, 'ngram 2=COUNT' expected"),
         ("-0.2\n", "inf\n", ":7: backoff weight inf is not finite"),
         ("ngram 2=1", "ngram 2=2", ":12: '' found, a number, 2 words and perhaps a tab and a weight expected"),
         ("ngram 1=3", "ngram 1=2", ":8: the header promises 2 1-grams, and there are more"),

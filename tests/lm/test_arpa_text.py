@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from placerec.lm import arpa_text
 from placerec.lm.arpa import format_arpa, read_arpa
 from placerec.lm.arpa_text import PackedLines, PlainLines, first_lines, number_cells
-from placerec.lm.backoff import BackoffModel, Singles
+from placerec.lm.backoff import BackoffModel
+from placerec.lm.logs import Singles
 from placerec.lm.trie import Trie, Vocabulary
 
 SINGLES = st.floats(width=32, allow_nan=False)
@@ -93,5 +94,6 @@ def test_long_words_and_nuls_are_written_plainly(word: str) -> None:
     lines = first_lines([word, "b"], "latin-1")
     assert isinstance(lines, PlainLines)
     place = np.zeros(1, np.int64)
-    written = b"".join(lines.blocks(np.array([-1.5], np.float32), np.array([np.nan], np.float32), place, place))
+    number = np.array([-1.5], np.float32)
+    written = b"".join(lines.blocks(number, number, np.zeros(1, bool), place, place))
     assert written == f"\n-1.5\t{word}".encode()

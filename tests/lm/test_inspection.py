@@ -1,5 +1,6 @@
 """Inspection: numbers that can be added up by hand."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -64,3 +65,11 @@ def test_most_frequent_by_joint_probability(model: Path) -> None:
 def test_words_that_are_not_listed_are_named(model: Path) -> None:
     with pytest.raises(LanguageModelError, match=r"place\.arpa: the word 'zebra' is not in the model"):
         inspect_model(model, ["a zebra"])
+
+
+def test_weights_beyond_float64_are_infinite(model: Path) -> None:
+    model.write_text(ARPA.replace("-0.2\n", "846\n"))
+    found = inspect_model(model, ["a c"])
+    assert found["highest_sum"] == math.inf
+    assert found["explained"][0]["p"] == math.inf
+    assert "sums to" in format_inspection(found)

@@ -25,8 +25,9 @@ def test_nothing_predicted_has_no_perplexity() -> None:
 
 
 def test_sentences_sum_up_to_the_text() -> None:
-    log10_p = np.array([-1, -2, ZERO, -4], np.float32)
-    rows = tally_sentences(log10_p, np.zeros(4, bool), np.array([0, 0, 2, 2]), np.array([True, False, True]))
+    log10_p = np.array([-1, -2, -8, ZERO, -4], np.float32)
+    scored, lengths = np.arange(5) != 2, np.array([2, 0, 3])
+    rows = tally_sentences(log10_p, np.zeros(5, bool), scored, lengths, np.array([True, False, True]))
     assert rows.tolist() == [[1, 1, 0, 0, -3], [0, 0, 0, 0, 0], [1, 1, 0, 1, -4]]
     total = sum((Totals(*row) for row in rows.tolist()), Totals())
     assert total == Totals(2, 2, 0, 1, -7)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from placerec.lm.counts import count_text
 from placerec.lm.stored_text import StoredText
-from placerec.srilm.hashing import capacities, first_positions, name_keys, needed, slot_order, walk_order
+from placerec.srilm.hashing import capacities, first_positions, needed, slot_order, walk_order
 from placerec.srilm.streams import tokens
 from placerec.srilm.vocabulary import WordList
 
@@ -83,15 +83,6 @@ def test_all_at_once_equals_entry_by_entry(keys: list[int], size_hint: int) -> N
 def test_a_large_table_equals_entry_by_entry() -> None:
     keys = np.random.default_rng(0).permutation(5000).tolist()
     assert slot_order(keys) == plain_order(keys)
-
-
-def test_names_are_folded_as_signed_bytes_and_wrap() -> None:
-    assert name_keys(["a", "ab", "é"]).tolist() == [97, 97 * 9 + 98, 2**64 + 0xE9 - 256]
-    long = "x" * 100
-    key = 0
-    for _ in long:
-        key = (9 * key + ord("x")) % 2**64
-    assert name_keys([long]).tolist() == [key]
 
 
 def read_sentences(path: Path, words: WordList) -> tuple[list[int], list[int]]:

@@ -92,6 +92,9 @@ def test_negative_values_are_fine_where_a_number_may_be_negative() -> None:
         ("-0X1f", -31),
         ("0x", 0),
         ("99999999999999999999", 2**63 - 1),
+        ("-" + "9" * 5000, 1 - 2**63),
+        ("1" + "0" * 5000, 2**63 - 1),
+        ("0x" + "0" * 5000 + "1", 1),
     ],
 )
 def test_whole_numbers_are_those_of_strtol(text: str, value: int) -> None:

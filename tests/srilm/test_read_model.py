@@ -1,5 +1,6 @@
 """The tolerant ARPA reader: its messages, what it keeps and drops, and the order in which contexts are found."""
 
+import re
 from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -9,16 +10,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from placerec.lm.arpa import row_blocks
 from placerec.lm.draft import Draft
-from placerec.srilm import arpa
-from placerec.srilm.arpa import log_value, read_model
-from placerec.srilm.arpa_text import format_draft
+from placerec.srilm import arpa_reader
+from placerec.srilm.arpa import read_model
+from placerec.srilm.arpa_reader import log_value
 from placerec.srilm.context_order import ContextTimes, message_order
+from placerec.srilm.ngram import ngram
 from placerec.srilm.streams import SrilmError, Streams
 from placerec.srilm.vocabulary import WordList
 
 HEADER = "\\data\\\nngram 1=2\nngram 2=1\n"
 GOOD = HEADER + "\\1-grams:\n-1\ta\t-0.5\n-2\tb\n\\2-grams:\n-0.1\ta b\n\\end\\\n"
+
+
+def format_draft(draft: Draft) -> str:
+    """A model's text, with whatever it lists."""
+    columns = draft.log10_p, draft.backoff, draft.node
+    return b"".join(row_blocks(draft.trie, *columns, stored=draft.stored, encoding="latin-1")).decode("latin-1")
 
 
 def read(
@@ -49,6 +58,8 @@ def read(
     [
         ("ngram 2=1", "ngram 101=1", "m: line 3: ngram order 101 out of range"),
         ("ngram 2=1", "ngram 2=-1", "m: line 3: ngram number -1 out of range"),
+        ("ngram 2=1", f"ngram {'1' * 5000}=1", f"m: line 3: ngram order {2**63 - 1} out of range"),
+        ("\\2-grams", f"\\{'1' * 5000}-grams", f"m: line 7: invalid ngram order {2**63 - 1}"),
         ("ngram 2=1", "ngram two=1", "m: line 3: unexpected input"),
         ("\\2-grams", "\\3-grams", "m: line 7: invalid ngram order 3"),
         ("\\2-grams", "\\0-grams", "m: line 7: invalid ngram order 0"),
@@ -102,6 +113,18 @@ def test_what_is_ordinary_is_read_in_silence(tmp_path: Path) -> None:
         again, _, said = read(odd, tmp_path)
         assert not said
         assert format_draft(again) == format_draft(draft)
+
+
+def test_what_is_odd_is_written_as_it_was_read(tmp_path: Path) -> None:
+    """An n-gram whose first words are not listed, a word that no 1-gram lists, and numbers that are none."""
+    lines = "\n\\data\\\nngram 1=1\nngram 2=1\nngram 3=1\n\n\\1-grams:\nnan\ta\tnan\n\n"
+    lines += "\\2-grams:\n-1\ta b\t-0.5\n\n\\3-grams:\n-1\ta b c\n\n\\end\\\n"
+    assert format_draft(read(lines, tmp_path)[0]) == lines
+    # With a context of three words, of which no shorter n-gram is listed.
+    lines = "\\data\\\nngram 3=1\nngram 4=1\n\\3-grams:\n-1\tx y z\t-0.5\n\\4-grams:\n-2\tx y z a\n\\end\\\n"
+    draft, _, said = read(lines, tmp_path, order=4)
+    assert said == ['m: line 5: warning: no bow for prefix of ngram "x y z"']
+    assert format_draft(draft).endswith("\n\\3-grams:\n\n\\4-grams:\n-2\tx y z a\n\n\\end\\\n")
 
 
 def test_numbers_as_srilm_reads_them() -> None:
@@ -170,7 +193,7 @@ def test_whole_blocks_are_read_as_line_by_line(tmp_path_factory: pytest.TempPath
     folder = tmp_path_factory.mktemp("models")
     quick, times, said = read(text, folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(arpa, "parse_block", lambda *args, **options: None)
+        patch.setattr(arpa_reader, "parse_block", lambda *args, **options: None)
         slow, slow_times, slow_said = read(text, folder)
     assert said == slow_said
     assert format_draft(quick) == format_draft(slow)
@@ -178,6 +201,25 @@ def test_whole_blocks_are_read_as_line_by_line(tmp_path_factory: pytest.TempPath
         np.testing.assert_array_equal(quick.trie.keys[n], slow.trie.keys[n])
         np.testing.assert_array_equal(quick.node[n], slow.node[n])
         np.testing.assert_array_equal(times.created[n], slow_times.created[n])
+
+
+@settings(max_examples=100, deadline=None)
+@given(models(), st.lists(st.lists(names, max_size=6), max_size=4), st.integers(1, 4))
+def test_a_model_read_for_scoring_gives_the_same_answers(
+    tmp_path_factory: pytest.TempPathFactory, text: str, sentences: list[list[str]], order: int
+) -> None:
+    folder = tmp_path_factory.mktemp("models")
+    (folder / "m").write_text(text, encoding="latin-1")
+    lines = "".join(" ".join(words) + "\n" for words in sentences)
+    command = ["-order", str(order), "-lm", str(folder / "m"), "-ppl", "-", "-debug"]
+    # At debug level 3 the whole model is read.
+    seen = {}
+    for debug in ("2", "3"):
+        out, err = BytesIO(), BytesIO()
+        assert ngram([*command, debug], Streams(BytesIO(lines.encode("latin-1")), out, err)) == 0
+        said = [line for line in err.getvalue().splitlines() if line and b"for this context sum to" not in line]
+        seen[debug] = re.sub(rb" / \S+$", b"", out.getvalue(), flags=re.MULTILINE), said
+    assert seen["2"] == seen["3"]
 
 
 class Table:

@@ -265,15 +265,12 @@ def test_an_interrupted_tool_says_nothing() -> None:
 
 
 def test_a_missing_numpy_is_named(tmp_path: Path) -> None:
-    python = tmp_path / "python"
-    # -S: without site-packages, as in a Python where numpy was never installed.
-    python.write_text(f'#!/bin/sh\nexec "{os.path.realpath(sys.executable)}" -S "$@"\n')
-    python.chmod(0o755)
+    run(sys.executable, "-m", "venv", "--without-pip", tmp_path / "empty")
     # A checkout without .venv, whose Python would be taken.
     checkout = tmp_path / "checkout"
     shutil.copytree(BIN, checkout / "bin")
     (checkout / "placerec").symlink_to(ROOT / "placerec")
-    done = run("env", f"PYTHON={python}", checkout / "bin/ngram-count", "-version")
+    done = run("env", f"PYTHON={tmp_path}/empty/bin/python", checkout / "bin/ngram-count", "-version")
     assert done.returncode == 1
     assert re.fullmatch(rf"{checkout}/bin/ngram-count: needs numpy: run `.* -m pip install numpy`\n", done.stderr)
 

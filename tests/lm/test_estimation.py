@@ -1,6 +1,7 @@
 """Estimation: the reference trainer's files to the byte, the plain twin's numbers, and sums of 1."""
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import golden
@@ -132,3 +133,10 @@ def test_wrong_options_are_named() -> None:
         estimate(counts, smoothing("lidstone"), min_count=(0,))
     with pytest.raises(LanguageModelError, match="holds no word that could be predicted"):
         estimate(counts, smoothing("lidstone"), non_events=[*VOCABULARY, "</s>"])
+
+
+def test_counts_too_large_to_leave_anything_are_named() -> None:
+    counts = count_ngrams([["a", "b"]], 2, vocabulary=VOCABULARY)
+    often = replace(counts, counts=tuple(10**17 * each for each in counts.counts))
+    with pytest.raises(LanguageModelError, match=r"a context of the 1-grams was counted 3e\+17 times: so often that"):
+        estimate(often, smoothing("lidstone-backoff", 1.0))

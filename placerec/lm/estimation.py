@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.errors import LanguageModelError
-from placerec.lm.backoff import BackoffModel, Singles
-from placerec.lm.counts import SENTENCE_END, SENTENCE_START, UNKNOWN, Mask, NgramCounts
+from placerec.lm.backoff import BackoffModel
+from placerec.lm.counts import Mask, NgramCounts
 from placerec.lm.discounts import Context, Floats, Rule
-from placerec.lm.draft import EPSILON, Draft, insert_prefixes, log10, p_of, weigh_contexts
+from placerec.lm.draft import Draft, insert_prefixes, weigh_contexts
+from placerec.lm.logs import EPSILON, Singles, log10, p_of
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import Smoothing
 from placerec.lm.trace import SILENT, Trace
 from placerec.lm.trie import Ints, Trie, per_context, runs
@@ -78,6 +80,10 @@ def estimate_draft(
         weigh_contexts(draft, n, trace)
         draft.refresh(n)
     return draft
+
+
+# SRILM adds 1 to a context's count until 3 in a million is left: a million steps do for counts of 3e11.
+_MOST_STEPS = 1e6
 
 
 @dataclass(frozen=True)
@@ -209,11 +215,22 @@ def _fill_order(draft: Draft, order: _Order, trace: Trace) -> None:
         total = np.where(todo & ~interpolate, total + 1, total)
         interpolate = interpolate & ~todo
         attempt += 1
+        _check_reachable(n, total[todo], spent[todo])
     stored = order.rows[kept]
     draft.log10_p[n - 1][stored] = log10(p[kept])
     draft.stored[n - 1][stored] = True
     if n > 1:
         draft.add_nodes(n - 1, runs(draft.trie.prefix(n)[stored])[0])
+
+
+def _check_reachable(n: int, total: Floats, spent: Floats) -> None:
+    """Raise LanguageModelError where counts (C,) are so large that adding 1 has (almost) no effect on what is left."""
+    far = ((spent - 1 + EPSILON) * total > _MOST_STEPS) | (total >= 2.0**53)
+    if far.any():
+        raise LanguageModelError(
+            f"a context of the {n}-grams was counted {total[far].max():g} times: so often that what it leaves to unseen"
+            " words is lost in rounding; divide the counts, or use another smoothing"
+        )
 
 
 def _attempt(

@@ -1,0 +1,221 @@
+"""What `ngram` puts around a model, or several: mixtures, a cache, and exceptions for unknown words and zeros."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from placerec.lm.dynamic import Cache, loglinear, mixed, posteriors, with_cache
+from placerec.lm.logs import Singles, p_of
+from placerec.lm.passage import Passage, used_context
+from placerec.lm.trie import Ints
+from placerec.srilm.scorers import Model, ModelView, Scored, Scorer, View, event_numbers
+from placerec.srilm.vocabulary import WordList
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """The mean of several models (-bayes), weighted by how well they predicted the last `length` words.
+
+    `detailed`: print the probabilities of the components.
+    """
+
+    models: Sequence[Model]
+    weights: Sequence[float]
+    length: int = 0
+    scale: float = 1.0
+    detailed: bool = False
+
+    def view(self, passage: Passage) -> "MixtureView":
+        """Read a passage."""
+        return MixtureView(self, [model.view(passage) for model in self.models])
+
+
+class MixtureView:
+    """A passage, read by the models of a Mixture."""
+
+    def __init__(self, mixture: Mixture, views: Sequence[ModelView]) -> None:
+        self.mixture = mixture
+        self.views = views
+        T = len(views[0].passage.ids)
+        if mixture.length > 0:
+            joints = np.stack([view.joint(mixture.length) for view in views])
+            self.posteriors = posteriors(mixture.weights, joints, mixture.scale)
+        else:
+            plain = np.array(mixture.weights, np.float64)
+            self.posteriors = np.repeat(plain[:, None] / plain.sum(), T, axis=1)
+
+    def score(self, words: Ints | None = None) -> Scored:
+        """The probabilities of the passage's words, or of others in their places."""
+        parts = [view.score(words) for view in self.views]
+        log10_ps = np.stack([part.log10_p for part in parts])
+
+        def tag(t: int) -> str:
+            found = "".join(part.tag(t) for part in parts)
+            if self.mixture.length > 0:
+                found += "[post=" + ",".join(f"{weight:.7g}" for weight in self.posteriors[:, t]) + "]"
+            if self.mixture.detailed:
+                found += "[probs=" + ",".join(f"{p:.7g}" for p in p_of(log10_ps[:, t])) + "]"
+            return found
+
+        return Scored(mixed(log10_ps, self.posteriors), tag)
+
+    def spread(self, t: int) -> Singles:
+        """log10 p of every word."""
+        return mixed(np.stack([view.spread(t) for view in self.views]), self.posteriors[:, t])
+
+
+@dataclass(frozen=True)
+class LogLinear:
+    """The normalised product of powers of several models (-loglinear-mix)."""
+
+    models: Sequence[Model]
+    weights: Sequence[float]
+    words: WordList
+
+    def view(self, passage: Passage) -> "LogLinearView":
+        """Read a passage."""
+        return LogLinearView(self, passage, [model.view(passage) for model in self.models])
+
+
+class LogLinearView:
+    """A passage, read by the models of a LogLinear; normalisers are kept per context."""
+
+    def __init__(self, mixture: LogLinear, passage: Passage, views: Sequence[ModelView]) -> None:
+        self.mixture = mixture
+        self.passage = passage
+        self.views = views
+        self.events = event_numbers(mixture.words)
+        self.used = np.max([used_context(view.reading) for view in views], axis=0)
+        self.sums: dict[tuple[int, ...], float] = {}
+
+    def score(self, words: Ints | None = None) -> Scored:
+        """The probabilities of the passage's words, or of others in their places."""
+        parts = [view.score(words) for view in self.views]
+        log10_p = loglinear(np.stack([part.log10_p for part in parts]), self.mixture.weights)
+        tags: dict[int, str] = {}
+        for t in np.flatnonzero(self.passage.scored).tolist():
+            known = self.context(t) in self.sums
+            total = self.total(t)
+            log_total = np.float32(np.log10(total)) if total > 0 else np.float32(-np.inf)
+            log10_p[t] -= log_total
+            tags[t] = f"[cached={float(p_of(np.array([log_total]))[0]):.7g}]" if known else f"[denom={total:.7g}]"
+
+        def tag(t: int) -> str:
+            # Once the product is 0 SRILM does not ask the models that are left.
+            zero = [bool(np.isneginf(part.log10_p[t])) for part in parts]
+            asked = zero.index(True) + 1 if any(zero) else len(parts)
+            return "".join(part.tag(t) for part in parts[:asked]) + tags[t]
+
+        return Scored(log10_p, tag)
+
+    def context(self, t: int) -> tuple[int, ...]:
+        """The words before word t that any of the models uses."""
+        return tuple(self.passage.ids[t - int(self.used[t]) : t].tolist())
+
+    def total(self, t: int) -> float:
+        """The sum over all words that the products at word t are divided by."""
+        context = self.context(t)
+        if context not in self.sums:
+            self.sums[context] = float(p_of(self._products(t)[self.events]).sum())
+        return self.sums[context]
+
+    def spread(self, t: int) -> Singles:
+        """log10 p of every word."""
+        with np.errstate(divide="ignore"):
+            return self._products(t) - np.float32(np.log10(self.total(t)))
+
+    def _products(self, t: int) -> Singles:
+        return loglinear(np.stack([view.spread(t) for view in self.views]), self.mixture.weights)
+
+
+@dataclass(frozen=True)
+class Cached:
+    """A scorer mixed with the shares of words among the last `size` that were predicted (-cache)."""
+
+    base: Scorer
+    words: WordList
+    size: int
+    weight: float
+
+    def view(self, passage: Passage) -> "CachedView":
+        """Read a passage."""
+        return CachedView(self, passage)
+
+
+class CachedView:
+    """A passage, read by what is below the cache; the cache holds what stands before each word."""
+
+    def __init__(self, cached: Cached, passage: Passage) -> None:
+        self.cached = cached
+        self.ids = passage.ids
+        self.base = cached.base.view(passage)
+        counted = passage.scored & (passage.ids != cached.words.index[cached.words.unknown])
+        self.cache = Cache(passage.ids, counted, cached.size)
+
+    def score(self, words: Ints | None = None) -> Scored:
+        """The probabilities of the passage's words, or of others in their places."""
+        below = self.base.score(words)
+        unknown = self.cached.words.index[self.cached.words.unknown]
+        ids = self.ids if words is None else words
+        shares = self.cache.shares(ids)
+        log10_p = with_cache(below.log10_p, shares, self.cached.weight)
+        return Scored(log10_p, lambda t: below.tag(t) + (f"[cache={shares[t]:.7g}]" if ids[t] != unknown else ""))
+
+    def spread(self, t: int) -> Singles:
+        """log10 p of every word."""
+        below = self.base.spread(t)
+        return with_cache(below, self.cache.spread(t, len(below)), self.cached.weight)
+
+
+@dataclass(frozen=True)
+class Lenient:
+    """A scorer with a fixed log10 p for the unknown word (-unk-prob), and a word (-zeroprob-word) whose probability
+    stands in where another's is 0.
+    """
+
+    base: Scorer
+    words: WordList
+    unknown_p: float | None = None
+    stand_in: int | None = None
+
+    def view(self, passage: Passage) -> "LenientView":
+        """Read a passage."""
+        return LenientView(self, passage.ids, self.base.view(passage))
+
+
+@dataclass(frozen=True)
+class LenientView:
+    """A passage, read by the scorer below."""
+
+    lenient: Lenient
+    ids: Ints
+    base: View
+
+    def score(self, words: Ints | None = None) -> Scored:
+        """The probabilities of the passage's words, or of others in their places."""
+        below = self.base.score(words)
+        ids = self.ids if words is None else words
+        log10_p = self._with_unknown(below.log10_p, ids)
+        stand_in = self.lenient.stand_in
+        if stand_in is None:
+            return Scored(log10_p, below.tag)
+        instead = np.isneginf(log10_p) & (ids != stand_in)
+        other = self.base.score(np.full(len(ids), stand_in, np.int64))
+        return Scored(
+            np.where(instead, other.log10_p, log10_p),
+            lambda t: below.tag(t) + (other.tag(t) if instead[t] else ""),
+        )
+
+    def spread(self, t: int) -> Singles:
+        """log10 p of every word."""
+        below = self.base.spread(t)
+        log10_p = self._with_unknown(below, np.arange(len(below)))
+        stand_in = self.lenient.stand_in
+        return log10_p if stand_in is None else np.where(np.isneginf(log10_p), below[stand_in], log10_p)
+
+    def _with_unknown(self, log10_p: Singles, ids: Ints) -> Singles:
+        if self.lenient.unknown_p is None:
+            return log10_p
+        unknown = ids == self.lenient.words.index[self.lenient.words.unknown]
+        return np.where(unknown, np.float32(self.lenient.unknown_p), log10_p)

@@ -1,0 +1,174 @@
+"""The models of `ngram` where more than scoring is asked for: mixed, changed, cached, written; section 11."""
+
+import numpy as np
+
+from placerec.lm.arpa import row_blocks
+from placerec.lm.draft import Draft, reweigh, unite
+from placerec.lm.mix import merge, merge_weight
+from placerec.lm.passage import Passage
+from placerec.lm.prune import prune, prune_improbable
+from placerec.srilm.arpa import read_model
+from placerec.srilm.context_order import ContextTimes, message_order
+from placerec.srilm.messages import Messages
+from placerec.srilm.mixed_scorers import Cached, Lenient, LogLinear, Mixture
+from placerec.srilm.options import Parsed
+from placerec.srilm.scorers import Model, Null, Scorer
+from placerec.srilm.streams import Streams
+from placerec.srilm.vocabulary import WordList
+
+
+class Models:
+    """The options, the words, and the model that can be written (None: there is none)."""
+
+    def __init__(self, options: Parsed, words: WordList, streams: Streams) -> None:
+        self.options = options
+        self.streams = streams
+        self.order = max(1, options["order"])
+        self.debug = options["debug"]
+        self.words = words
+        self.draft: Draft | None = None
+        self.times: ContextTimes | None = None
+
+    def scorer(self) -> Scorer:
+        """What scores: sections 9.2 to 9.6, in this order."""
+        if self.options["null"]:
+            scorer: Scorer = Null(self.words)
+        else:
+            self.draft, self.times = self.read("lm", "lm file")
+            scorer = self.with_cache(self.mixed())
+        scorer = self.lenient(scorer)
+        return self.rescored(scorer) if self.options["rescore-ngram"] else scorer
+
+    def read(
+        self, option: str, what: str, *, order: int | None = None, words: WordList | None = None
+    ) -> tuple[Draft, ContextTimes]:
+        """Read the model that an option names."""
+        return read_model(
+            self.options[option],
+            words or self.words,
+            self.streams,
+            order=order or self.order,
+            debug=self.debug,
+            limited=self.options["limit-vocab"] and words is None,
+            what=what,
+        )
+
+    def together(self, *drafts: Draft) -> list[Draft]:
+        """The models over one trie and all words known by now."""
+        vocabulary, _ = self.words.sorted()
+        if len(drafts) == 1 and drafts[0].trie.vocabulary.words == vocabulary.words:
+            return [*drafts]
+        names = np.array(self.words.names(vocabulary), np.int64)
+        return unite(drafts, vocabulary, ~vocabulary.mask(self.words.non_events), names)
+
+    def messages(self, draft: Draft) -> Messages:
+        """Who says what happens to a model."""
+        order = message_order(draft.trie, self.times) if self.times else None
+        return Messages(draft.trie, self.streams, self.debug, weighed=order)
+
+    def components(self) -> tuple[list[str], list[float]]:
+        """The options that name models to mix in, and the weights of all models, -lm's first."""
+        options = self.options
+        if not options["mix-lm"]:
+            return [], [1.0]
+        more = [k for k in range(2, 10) if options[f"mix-lm{k}"]]
+        shares = [options[f"mix-lambda{k}"] for k in more]
+        rest = 1.0 - options["lambda"] - sum(options[f"mix-lambda{k}"] for k in range(2, 10))
+        return ["mix-lm", *(f"mix-lm{k}" for k in more)], [options["lambda"], rest, *shares]
+
+    def mixed(self) -> Scorer:
+        """Static and dynamic mixtures, and what changes the model between them."""
+        options = self.options
+        others, weights = self.components()
+        dynamic = options["bayes"] is not None or options["loglinear-mix"]
+        if not dynamic:
+            for k, option in enumerate(others, start=1):
+                self.draft, other = self.together(self.model(), self.read(option, "mix-lm file")[0])
+                merge(self.draft, other, merge_weight(weights, k), self.messages(self.draft))
+        self.change()
+        model = Model(self.model(), self.words, options["skipoovs"])
+        if not dynamic or not others:
+            return model
+        models = [model, *(Model(self.read(option, "mix-lm file")[0], self.words) for option in others)]
+        self.draft = None
+        if options["loglinear-mix"]:
+            return LogLinear(models, weights, self.words)
+        return Mixture(models, weights, options["bayes"], options["bayes-scale"], self.debug == 3)
+
+    def model(self) -> Draft:
+        """The model that was read; there is one wherever this is called."""
+        assert self.draft is not None
+        return self.draft
+
+    def change(self) -> None:
+        """`-renorm`, `-prune` and `-prune-lowprobs`."""
+        options = self.options
+        if options["renorm"]:
+            (draft,) = self.together(self.model())
+            least = options["minbackoff"]
+            reweigh(draft, self.messages(draft), minimum=least if least is not None and 0 <= least <= 1 else None)
+            self.draft = draft
+        if options["prune"] > 0:
+            draft, history = self.pruned_by()
+            trace = self.messages(draft)
+            prune(draft, options["prune"], shortest=options["minprune"], history=history, trace=trace)
+            self.draft = draft
+        if options["prune-lowprobs"]:
+            (draft,) = self.together(self.model())
+            prune_improbable(draft, shortest=options["minprune"], trace=self.messages(draft))
+            self.draft = draft
+
+    def pruned_by(self) -> tuple[Draft, Draft | None]:
+        """The model to prune and the one that says how probable contexts are."""
+        if not self.options["prune-history-lm"]:
+            return self.together(self.model())[0], None
+        history, _ = self.read("prune-history-lm", "history LM file", order=max(1, self.order - 1))
+        draft, wider = self.together(self.model(), history)
+        return draft, wider
+
+    def with_cache(self, scorer: Scorer) -> Scorer:
+        """`-cache`."""
+        if not self.options["cache"]:
+            return scorer
+        self.draft = None
+        return Cached(scorer, self.words, self.options["cache"], self.options["cache-lambda"])
+
+    def lenient(self, scorer: Scorer) -> Scorer:
+        """`-zeroprob-word` and `-unk-prob`."""
+        unknown_p, stand_in = self.options["unk-prob"], self.options["zeroprob-word"]
+        if unknown_p is None and stand_in is None:
+            return scorer
+        if unknown_p == -99:
+            unknown_p = -np.inf
+        return Lenient(scorer, self.words, unknown_p, None if stand_in is None else self.words.add(stand_in))
+
+    def rescored(self, scorer: Scorer) -> Scorer:
+        """`-rescore-ngram` (section 11.6): another model's n-grams with the probabilities that `scorer` gives them."""
+        options = self.options
+        own = WordList(lower=options["tolower"], open_unknown=options["unk"])
+        draft, self.times = self.read("rescore-ngram", "lm file", words=own)
+        index, unknown = self.words.index, self.words.index[self.words.unknown]
+        numbers = np.array([index.get(word, unknown) for word in draft.trie.vocabulary.words], np.int64)
+        for n in range(draft.order, 0, -1):
+            rows = np.flatnonzero(draft.stored[n - 1])
+            passage = Passage.of_rows(numbers[draft.trie.matrix(n)[rows]])
+            draft.log10_p[n - 1][rows] = scorer.view(passage).score().log10_p[n - 1 :: n]
+        reweigh(draft, self.messages(draft))
+        self.draft, self.words = draft, own
+        return Model(draft, own)
+
+    def write(self, name: str) -> None:
+        """`-write-lm`."""
+        draft = self.draft
+        if draft is None:
+            self.streams.write(name, "")
+            self.streams.say("write() method not implemented")
+            self.streams.say(f"error writing {name}")
+            return
+        if self.debug >= 1:
+            for n, stored in enumerate(draft.stored, start=1):
+                self.streams.say(f"writing {int(stored.sum())} {n}-grams")
+        with self.streams.output(name) as file:
+            # SRILM writes an n-gram though its first words are not listed.
+            columns = draft.log10_p, draft.backoff, draft.node
+            file.writelines(row_blocks(draft.trie, *columns, stored=draft.stored, encoding="latin-1"))
