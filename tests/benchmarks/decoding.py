@@ -1,6 +1,6 @@
 """How fast words become beliefs, beside KenLM, hmmlearn and the plain twin, turn by turn in one process.
 
-    python tests/benchmarks/recognizer.py [TOKENS]
+    python tests/benchmarks/decoding.py [TOKENS]
 
 Five places, 400 visual words, models of order 4; the words are made from a seed, each place prefers words of its own.
 
