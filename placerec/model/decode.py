@@ -8,8 +8,9 @@ from pathlib import Path
 
 from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
-from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, format_row
+from placerec.hohmm import Beliefs, belief_rows, format_header, format_row
 from placerec.model.corpus import STREAM_SUFFIXES
+from placerec.model.decoder import Decoder
 from placerec.model.decoding import PAPER, Decoding
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.recognize import make_recognizer, token_streams
@@ -31,24 +32,26 @@ def decode(
     scorer: str = "native",
     as_json: bool = False,
     progress: Progress | None = None,
+    make: Callable[..., Decoder] = make_recognizer,
 ) -> list[Beliefs]:
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
     `sources`: token streams, or image sources (of `format`) if `words` (a words.npz) is given. Without `out` there must
-    be one sequence only. Raises ModelError or StreamError for what cannot be read or does not belong together.
+    be one sequence only. `make`: what gives the decoder, for the arguments of `make_recognizer`. Raises ModelError or
+    StreamError for what cannot be read or does not belong together.
     """
 
     def decoded() -> list[Beliefs]:
         models = load_model(model)
         if words is None:
-            recognizer = make_recognizer(models, options=options, scorer=scorer)
+            recognizer = make(models, options=options, scorer=scorer)
             streams = token_streams(sources, models)
         else:
-            recognizer, streams = _image_streams(sources, Path(words), models, format, options, scorer, progress)
+            recognizer, streams = _image_streams(sources, Path(words), models, format, options, scorer, progress, make)
         if out is None and len(streams) > 1:
             raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
-        ahead = {"smooth": options.smooth, "viterbi": options.viterbi}
-        return [recognizer.decode(stream, **ahead, lag=options.lag) for stream in streams]
+        ahead = {"smooth": options.smooth, "viterbi": options.viterbi, "lag": options.lag}
+        return [recognizer.decode(stream, **(ahead if options.looks_ahead else {})) for stream in streams]
 
     if out is None:
         return decoded()
@@ -70,7 +73,8 @@ def _image_streams(
     options: Decoding,
     scorer: str,
     progress: Progress | None,
-) -> tuple[Recognizer, list[WordStream]]:
+    make: Callable[..., Decoder],
+) -> tuple[Decoder, list[WordStream]]:
     # Only images need OpenCV and scipy.
     from placerec.vision import Dictionary
     from placerec.words.tokenize import streams_of
@@ -79,7 +83,7 @@ def _image_streams(
         if str(source).endswith(STREAM_SUFFIXES):
             raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
     dictionary = Dictionary.load(words)
-    recognizer = make_recognizer(models, options=options, scorer=scorer, dictionary=dictionary)
+    recognizer = make(models, options=options, scorer=scorer, dictionary=dictionary)
     return recognizer, streams_of(sources, dictionary, format=format, progress=progress)
 
 
@@ -97,7 +101,7 @@ def format_beliefs(beliefs: Beliefs, *, as_json: bool = False) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def decode_lines(recognizer: Recognizer, lines: Iterable[str], *, as_json: bool = False) -> Iterator[str]:
+def decode_lines(recognizer: Decoder, lines: Iterable[str], *, as_json: bool = False) -> Iterator[str]:
     """`placerec decode -`: an answer for each line `word` or `word TAB seconds`, as soon as it is read.
 
     The TSV header comes before the first line is read. A word that the models do not list holds the belief; the first

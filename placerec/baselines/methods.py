@@ -1,0 +1,26 @@
+"""Every system that learns from words alone, by name."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from placerec.baselines import majority, naive_bayes
+from placerec.baselines.lesson import Follow, Lesson
+from placerec.hohmm import Emissions
+
+
+@dataclass(frozen=True)
+class Method:
+    """A system: either `emissions`, for the filter of eq. 1, or `follow`, beliefs without it; neither: `hohmm`."""
+
+    emissions: Callable[[Lesson], Emissions] | None = None
+    follow: Callable[[Lesson], Follow] | None = None
+
+
+HOHMM = "hohmm"
+METHODS: dict[str, Method] = {
+    HOHMM: Method(),
+    "majority": Method(follow=majority.fit),
+    "naive-bayes": Method(follow=naive_bayes.fit),
+}
+# What words alone do not tell; `compare` runs these.
+NEED_DESCRIPTORS = ("torralba2003", "pronobis2007", "ullah2008", "knn")
