@@ -42,7 +42,7 @@ def fit(
     `window`: None for all words; `forgetting`: from 0 (the last word alone) to 1 (none); `detector`: one of DETECTORS.
     `threshold` in nats. Raises ModelError for values out of range, and for a window with a detector or with forgetting.
     """
-    if detector not in DETECTORS or not 0 <= forgetting <= 1 or min(recent, window or 1) < 1:
+    if detector not in DETECTORS or not 0 <= forgetting <= 1 or recent < 1 or (window is not None and window < 1):
         raise ModelError(f"a bag of window {window}, forgetting {forgetting}, detector {detector!r} makes no sense")
     if window is not None and (detector != "none" or forgetting != 1):
         raise ModelError("a bag of a fixed window forgets by itself: it takes neither forgetting nor a detector")
