@@ -33,7 +33,9 @@ def read_decision(path: Path | str, frame: str) -> Decision:
 
     Raises EvaluationError if there is none, there are several, or it is no such file.
     """
-    decisions = [_decision(path, *item) for item in enumerate(read_text(Path(path), EvaluationError).splitlines(), 1)]
+    # Not splitlines: a frame may be named with one of the dozen characters that Unicode counts as line ends.
+    lines = read_text(Path(path), EvaluationError).removesuffix("\n").split("\n")
+    decisions = [_decision(path, number, line) for number, line in enumerate(lines, start=1) if line]
     found = [one for one in decisions if one["frame"] == frame] or [
         one for one in decisions if one["frame"].startswith(frame)
     ]

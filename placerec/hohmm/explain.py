@@ -11,7 +11,7 @@ which the transitions make smaller step by step: words fade as the filter forget
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -39,6 +39,7 @@ WINDOW, NAMED = 20, 3
 LEAST = 0.01
 # log10 p of a word that a place rules out: what SRILM writes for a probability of 0.
 NEVER = -99.0
+_OF_PLACE, _OF_UNKNOWN = ("log10_p", "before", "after"), ("log10_ratio", "before", "after")
 
 
 def explain_stream(
@@ -49,44 +50,32 @@ def explain_stream(
     The beliefs are the filter's own, before any calibration.
     """
     answer = _answers(models)
+    longest = max(model.order for model in models.values()) - 1
     for part in recognizer.evidence(stream):
         before, after = _beliefs(part.log10_p, recognizer.transition, part.elapsed)
         order = np.argsort(-after, axis=1, kind="stable")
         contributed = contributions(part, recognizer.transition, before, after, order[:, :2])
         news = _news(recognizer, part, stream)
         words = [stream.words[i] for i in part.at.tolist()]
-        longest = max(model.order for model in models.values()) - 1
+        numbers = np.stack([part.log10_p, before, after], axis=2)
         for t, i in enumerate(part.at.tolist()):
-            history = tuple(words[max(0, t - longest) : t])
-            numbers = zip(part.log10_p[t].tolist(), before[t].tolist(), after[t].tolist(), strict=True)
+            history = words[max(0, t - longest) : t]
             best, *others = [recognizer.places[column] for column in order[t].tolist()]
             recent = [(stream.frames[part.at[t - k]], words[t - k]) for k in range(min(WINDOW, t + 1))]
-            supporting, opposing = _arguments(recent, contributed[t].tolist()) if others else ([], [])
+            said = zip(recognizer.places, numbers[t].tolist(), strict=True)
             yield {
                 "frame": stream.frames[i],
                 "time": None if math.isnan(stream.times[i]) else float(stream.times[i]),
                 "place": stream.places[i] or None,
                 "word": words[t],
-                "history": list(history),
+                "history": history,
                 "best_before": recognizer.places[int(before[t].argmax())],
                 "best": best,
                 "rival": others[0] if others else None,
-                "places": {
-                    place: {
-                        "log10_p": _short(log10_p),
-                        **answer(place, (*history, words[t])),
-                        "before": _short(prior),
-                        "after": _short(posterior),
-                    }
-                    for place, (log10_p, prior, posterior) in zip(recognizer.places, numbers, strict=True)
-                },
-                "for": supporting,
-                "against": opposing,
-                **({} if news is None else {"unknown": dict(zip(_NEWS, map(_short, news[t].tolist()), strict=True))}),
+                "places": {place: _named(_OF_PLACE, row) | answer(place, (*history, words[t])) for place, row in said},
+                **_arguments(recent, contributed[t].tolist()),
+                **({} if news is None else {"unknown": _named(_OF_UNKNOWN, news[t].tolist())}),
             }
-
-
-_NEWS = ("log10_ratio", "before", "after")
 
 
 def contributions(part: Evidence, transition: Transition, before: Floats, after: Floats, pair: Ints) -> Floats:
@@ -136,7 +125,7 @@ def _news(recognizer: Recognizer, part: Evidence, stream: WordStream) -> Floats 
     return np.stack([ratios / math.log(10), before[:, 0], after[:, 0]], axis=1)
 
 
-def _answers(models: Mapping[str, BackoffModel]) -> Any:
+def _answers(models: Mapping[str, BackoffModel]) -> Callable[[str, tuple[str, ...]], dict[str, Any]]:
     """A function that tells for a place and words which order answered for the last one, and the backoffs paid."""
 
     @cache
@@ -148,10 +137,8 @@ def _answers(models: Mapping[str, BackoffModel]) -> Any:
     return answer
 
 
-def _arguments(
-    recent: Sequence[tuple[str, str]], contributed: Sequence[float]
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """The words that argued most for the best place, and those that argued most against it, the strongest first.
+def _arguments(recent: Sequence[tuple[str, str]], contributed: Sequence[float]) -> dict[str, list[dict[str, Any]]]:
+    """The words that argued most `for` the best place, and most `against` it, the strongest first.
 
     `recent`: frame and word, the latest first; a word that comes several times argues once, with the sum.
     """
@@ -160,7 +147,7 @@ def _arguments(
     for ago, ((frame, word), moved) in enumerate(zip(recent, contributed, strict=False)):
         sums[word] = sums.get(word, 0.0) + moved
         heard.setdefault(word, []).insert(0, (ago, frame))
-    named = [
+    named: list[dict[str, Any]] = [
         {
             "word": word,
             "frames": [frame for _, frame in heard[word]],
@@ -169,8 +156,13 @@ def _arguments(
         }
         for word in sorted(sums, key=lambda word: -sums[word])
     ]
-    supporting = [one for one in named if sums[str(one["word"])] > LEAST][:NAMED]
-    return supporting, [one for one in reversed(named) if sums[str(one["word"])] < -LEAST][:NAMED]
+    supporting = [one for one in named if sums[one["word"]] > LEAST]
+    opposing = [one for one in reversed(named) if sums[one["word"]] < -LEAST]
+    return {"for": supporting[:NAMED], "against": opposing[:NAMED]}
+
+
+def _named(names: Sequence[str], values: Sequence[float]) -> dict[str, float | None]:
+    return dict(zip(names, map(_short, values), strict=True))
 
 
 def _short(value: float) -> float | None:

@@ -149,3 +149,13 @@ def test_what_speaks_for_a_new_place_is_told_too() -> None:
         odds = [p / (1 - p) for p in (one["before"], one["after"])]
         assert math.log10(odds[1] / odds[0]) == pytest.approx(one["log10_ratio"], abs=1e-4)
     assert found[1]["log10_ratio"] > 0
+
+
+def test_a_sequence_without_a_listed_word_decides_nothing() -> None:
+    models = models_of(CORPUS, 2)
+    for transition in (fixed_transition(3), Transition(np.full((3, 3), 1 / 3))):
+        recognizer = Recognizer(models, transition=transition, unknown=novelty(3))
+        stream = WordStream.of("run", ["zebra", "zebra"])
+        assert explained(recognizer, models, stream) == []
+        assert recognizer.decode(stream).unknown == pytest.approx([0.25, 0.25])
+        assert recognizer.decode(stream, smooth=True).unknown == pytest.approx([0.25, 0.25])
