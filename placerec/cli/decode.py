@@ -15,11 +15,26 @@ from placerec.cli.options import (
     output_option,
     progress_bar,
     talk_options,
+    usage,
     words_option,
 )
 
 if TYPE_CHECKING:
     from placerec.model import Decoding
+
+# What stands in placerec.baselines.METHODS, where reading it would load numpy.
+METHODS = (
+    "majority",
+    "naive-bayes",
+    "wu2009",
+    "dubois2011",
+    "guillaume2011",
+    "pronobis2010",
+    "ranganathan2010",
+    "filliat2008",
+    "mtd",
+    "second-order",
+)
 
 
 @click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
@@ -32,6 +47,13 @@ if TYPE_CHECKING:
 @click.option("--calibrated", is_flag=True, help="Apply what `placerec calibrate` found to the beliefs.")
 @click.option("--unknown", is_flag=True, help="Add a column: the probability that the place is none of the model's.")
 @click.option("--explain", is_flag=True, help="Write NAME.explain.jsonl beside the beliefs: what decided each word.")
+@click.option(
+    "--method",
+    metavar="NAME",
+    default="hohmm",
+    show_default=True,
+    help=f"What turns words into beliefs: hohmm, {', '.join(METHODS)}.",
+)
 @click.option(
     "--scorer",
     type=click.Choice(["native", "kenlm"]),
@@ -49,6 +71,7 @@ def decode(
     model: Path,
     words: Path | None,
     format_: str,
+    method: str,
     scorer: str,
     as_json: bool,
     out: Path | None,
@@ -59,9 +82,12 @@ def decode(
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, images. `-` reads one word a
     line (or word, tab, seconds, tab, distance) and answers each at once.
     """
-    from placerec.model import decode as run
-    from placerec.model import decode_lines, format_beliefs, load_recognizer
+    from placerec.baselines import check_method, load_decoder
+    from placerec.baselines import decode as run
+    from placerec.model import decode_lines, format_beliefs
 
+    with usage("--method"):
+        check_method(method, options, scorer=scorer)
     if tokens == (Path("-"),):
         if options.explain:
             raise click.UsageError("`-` answers on stdout and writes no files: it takes no --explain")
@@ -73,7 +99,7 @@ def decode(
             raise click.UsageError(
                 "`-` answers each line before later words are known: it takes none of --smooth, --viterbi, --lag"
             )
-        recognizer = load_recognizer(model, options=options, scorer=scorer)
+        recognizer = load_decoder(method, model, options=options, scorer=scorer)
         for line in decode_lines(recognizer, sys.stdin, as_json=as_json):
             click.echo(line)
         return
@@ -85,6 +111,7 @@ def decode(
         beliefs = run(
             tokens,
             model,
+            method=method,
             words=words,
             out=out,
             format=format_,

@@ -3,6 +3,7 @@
 from placerec.model.calibrate import calibrate
 from placerec.model.corpus import Corpus, read_corpus
 from placerec.model.decode import decode, decode_lines, format_beliefs
+from placerec.model.decoder import Decoder
 from placerec.model.decoding import Decoding, transition_of
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.recognize import load_recognizer, make_recognizer
@@ -11,6 +12,7 @@ from placerec.model.update import update
 
 __all__ = [
     "Corpus",
+    "Decoder",
     "Decoding",
     "Options",
     "PlaceModels",

@@ -12,6 +12,7 @@ from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, form
 from placerec.hohmm.beliefs import UNKNOWN
 from placerec.hohmm.explain import EXPLAINED, explain_stream
 from placerec.model.corpus import STREAM_SUFFIXES
+from placerec.model.decoder import Decoder
 from placerec.model.decoding import PAPER, Decoding
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.recognize import make_recognizer, token_streams
@@ -33,29 +34,31 @@ def decode(
     scorer: str = "native",
     as_json: bool = False,
     progress: Progress | None = None,
+    make: Callable[..., Decoder] = make_recognizer,
 ) -> list[Beliefs]:
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
     `sources`: token streams, or image sources (of `format`) if `words` (a words.npz) is given. Without `out` there must
-    be one sequence only; explanations are written there, as NAME.explain.jsonl. Raises ModelError or StreamError for
-    what cannot be read or does not belong together.
+    be one sequence only; explanations are written there, as NAME.explain.jsonl. `make`: what gives the decoder, for
+    the arguments of `make_recognizer`. Raises ModelError or StreamError for what cannot be read or does not belong
+    together.
     """
     if out is None:
         if options.explain:
             raise ModelError("explanations are files: name a folder for them with -o")
-        _, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress)
+        _, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress, make)
         if len(streams) > 1:
             raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
         return [_decoded(recognizer, stream, options) for stream in streams]
     _spare_sources(sources, Path(out))
     found = []
     with whole_folder(Path(out), OWNED) as folder:
-        models, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress)
+        models, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress, make)
         for stream in streams:
             beliefs = _decoded(recognizer, stream, options)
             suffix = "jsonl" if as_json else "tsv"
             write_text(folder / f"{beliefs.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
-            if options.explain:
+            if options.explain and isinstance(recognizer, Recognizer):
                 lines = explain_stream(recognizer, models.models, stream)
                 text = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines)
                 write_text(folder / f"{beliefs.name}{EXPLAINED}", text)
@@ -72,15 +75,17 @@ def _opened(
     options: Decoding,
     scorer: str,
     progress: Progress | None,
-) -> tuple[PlaceModels, Recognizer, list[WordStream]]:
+    make: Callable[..., Decoder],
+) -> tuple[PlaceModels, Decoder, list[WordStream]]:
     models = load_model(model)
     if words is not None:
-        return models, *_image_streams(sources, Path(words), models, format, options, scorer, progress)
-    return models, make_recognizer(models, options=options, scorer=scorer), token_streams(sources, models)
+        return models, *_image_streams(sources, Path(words), models, format, options, scorer, progress, make)
+    return models, make(models, options=options, scorer=scorer), token_streams(sources, models)
 
 
-def _decoded(recognizer: Recognizer, stream: WordStream, options: Decoding) -> Beliefs:
-    return recognizer.decode(stream, smooth=options.smooth, viterbi=options.viterbi, lag=options.lag)
+def _decoded(recognizer: Decoder, stream: WordStream, options: Decoding) -> Beliefs:
+    ahead = {"smooth": options.smooth, "viterbi": options.viterbi, "lag": options.lag}
+    return recognizer.decode(stream, **(ahead if options.looks_ahead else {}))
 
 
 def _image_streams(
@@ -91,7 +96,8 @@ def _image_streams(
     options: Decoding,
     scorer: str,
     progress: Progress | None,
-) -> tuple[Recognizer, list[WordStream]]:
+    make: Callable[..., Decoder],
+) -> tuple[Decoder, list[WordStream]]:
     # Only images need OpenCV and scipy.
     from placerec.vision import Dictionary
     from placerec.words.tokenize import streams_of
@@ -100,7 +106,7 @@ def _image_streams(
         if str(source).endswith(STREAM_SUFFIXES):
             raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
     dictionary = Dictionary.load(words)
-    recognizer = make_recognizer(models, options=options, scorer=scorer, dictionary=dictionary)
+    recognizer = make(models, options=options, scorer=scorer, dictionary=dictionary)
     return recognizer, streams_of(sources, dictionary, format=format, progress=progress)
 
 
@@ -118,7 +124,7 @@ def format_beliefs(beliefs: Beliefs, *, as_json: bool = False) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def decode_lines(recognizer: Recognizer, lines: Iterable[str], *, as_json: bool = False) -> Iterator[str]:
+def decode_lines(recognizer: Decoder, lines: Iterable[str], *, as_json: bool = False) -> Iterator[str]:
     """`placerec decode -`: an answer for each line `word [TAB [seconds] [TAB distance]]`, as soon as it is read.
 
     The TSV header comes before the first line is read. A word that the models do not list holds the belief; the first

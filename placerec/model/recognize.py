@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from placerec.errors import ModelError
-from placerec.hohmm import Recognizer, SeparateEmissions
+from placerec.hohmm import Emissions, Recognizer, SeparateEmissions
 from placerec.lm.external import kenlm_scorer
 from placerec.model.corpus import check_dictionary, read_streams, stream_files
 from placerec.model.decoding import PAPER, Decoding, transition_of
@@ -40,14 +40,10 @@ def make_recognizer(
     options: Decoding = PAPER,
     dictionary: "Dictionary | None" = None,
     scorer: str = "native",
+    emissions: Emissions | None = None,
 ) -> Recognizer:
-    """The recognizer of a model that is loaded; see `load_recognizer`."""
-    trained_on = model.description["dictionary"]
-    if dictionary is not None and trained_on is not None and dictionary.fingerprint != trained_on:
-        raise ModelError(
-            f"{model.path}: was trained on the words of another dictionary than the one given; "
-            "give the words.npz of its training, or train it again"
-        )
+    """The recognizer of a model that is loaded; see `load_recognizer`. `emissions`: in place of the models' own."""
+    check_words(model, dictionary)
     if scorer not in ("native", "kenlm"):
         raise ModelError(f"scorer {scorer!r} is unknown; choose native or kenlm")
     return Recognizer(
@@ -56,10 +52,20 @@ def make_recognizer(
         transition=transition_of(model, options),
         dictionary=dictionary,
         max_gap=options.max_gap,
-        emissions=_kenlm(model) if scorer == "kenlm" else None,
+        emissions=_kenlm(model) if scorer == "kenlm" else emissions,
         calibration=calibration_of(model, options) if options.calibrated else None,
         unknown=unknown_model_of(model) if options.unknown else None,
     )
+
+
+def check_words(model: PlaceModels, dictionary: "Dictionary | None") -> None:
+    """Raise ModelError if `dictionary` is known not to be the one that made the words of `model`."""
+    trained_on = model.description["dictionary"]
+    if dictionary is not None and trained_on is not None and dictionary.fingerprint != trained_on:
+        raise ModelError(
+            f"{model.path}: was trained on the words of another dictionary than the one given; "
+            "give the words.npz of its training, or train it again"
+        )
 
 
 def token_streams(sources: Sequence[Path | str], model: PlaceModels) -> list[WordStream]:

@@ -9,6 +9,7 @@ from click.testing import CliRunner, Result
 from small import PLACES, write_tokens
 
 from placerec.cli import commands
+from placerec.cli.decode import METHODS
 from placerec.model import calibrate, train_lm
 
 
@@ -39,6 +40,13 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--lag", "-1"), "-1 is not in the range x>=0"),
         (("--max-gap", "0"), "0.0 is not in the range x>0"),
         (("--max-gap", "inf"), "inf is not a number that can be used"),
+        (("--method", "knn"), "knn needs descriptors, not words alone; `placerec compare` runs it"),
+        (("--method", "bayes"), "method 'bayes' is unknown; choose one of hohmm, majority, naive-bayes, wu2009"),
+        (("--method", "filliat2008", "--smooth"), "filliat2008 has no use for smooth; leave it out"),
+        (("--method", "naive-bayes", "--per", "frame"), "naive-bayes has no use for per; leave it out"),
+        (("--method", "majority", "--unknown"), "majority has no use for unknown; leave it out"),
+        (("--method", "mtd", "--calibrated"), "mtd has no use for calibrated; leave it out"),
+        (("--method", "wu2009", "--scorer", "kenlm"), "wu2009 has no use for another scorer of the language models"),
         (("--per", "hour"), "'hour' is not one of 'update', 'frame', 'second'"),
     ],
 )
@@ -135,3 +143,56 @@ def test_decisions_are_written_and_read(world: Path, tmp_path: Path) -> None:
     for wrong, code in (((path,), 2), ((path, "1", "2"), 2), ((path, "12", "--top", "3"), 2), ((path, "99"), 1)):
         assert inspect(*wrong).exit_code == code
     assert inspect(world / "model/hall.arpa", "-o", page).exit_code == 2
+
+
+@pytest.mark.parametrize("method", ["hohmm", *METHODS])
+def test_a_stream_is_answered_by_every_method(method: str, world: Path) -> None:
+    """The same as from a file, up to the names of frames and the label."""
+    words = ["w01", "w02", "zz", "w02", "w07"]
+    (world / "words.txt").write_text(" ".join(words))
+    recorded = decode(world / "words.txt", "-m", world / "model", "--method", method)
+    streamed = decode("-", "-m", world / "model", "--method", method, stdin="".join(f"{word}\n" for word in words))
+    assert (recorded.exit_code, streamed.exit_code) == (0, 0)
+    assert "'zz'" in streamed.stderr
+    rows = [[line.split("\t")[3:] for line in result.stdout.splitlines()] for result in (recorded, streamed)]
+    assert rows[0][0] == rows[1][0]
+    for a, b in zip(rows[0][1:], rows[1][1:], strict=True):
+        assert a[:3] == b[:3]
+        assert [float(p) for p in a[3:]] == pytest.approx([float(p) for p in b[3:]], abs=1e-8)
+
+
+@pytest.mark.parametrize("method", ["ranganathan2010", "wu2009", "mtd"])
+def test_methods_that_know_of_somewhere_new(method: str, world: Path) -> None:
+    run = world / "tokens/run3.tsv", "-m", world / "model", "--method", method
+    lines = [line.split("\t") for line in decode(*run, "--unknown").stdout.splitlines()]
+    assert lines[0][-1] == "unknown"
+    assert all(0 <= float(line[-1]) <= 1 for line in lines[1:])
+    assert all(sum(map(float, line[6:-1])) == pytest.approx(1, abs=1e-6) for line in lines[1:])
+
+
+@pytest.mark.parametrize("method", ["ranganathan2010", "majority"])
+def test_a_gap_begins_a_new_sequence_for_every_method(method: str, world: Path) -> None:
+    run = world / "tokens/run3.tsv", "-m", world / "model", "--method", method
+    every = [line.split("\t") for line in decode(*run, "--max-gap", "0.1").stdout.splitlines()[1:]]
+    # Each frame is alone, and what is believed of it depends on its word.
+    beliefs = {(line[3], tuple(line[6:])) for line in every}
+    assert len(beliefs) == len({word for word, _ in beliefs})
+
+
+def test_a_largest_gap_needs_times(world: Path) -> None:
+    (world / "words.txt").write_text("w01 w02")
+    result = decode(world / "words.txt", "-m", world / "model", "--method", "majority", "--max-gap", "2")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "words: frame '0': the frame has no time, which the largest gap needs" in result.stderr
+    back = decode("-", "-m", world / "model", "--method", "majority", "--max-gap", "2", stdin="w01\t5\nw01\t4\n")
+    assert back.exit_code == 1
+    assert "<stdin>:2: time goes back from 5.000000 to 4.000000 s" in back.stderr
+
+
+def test_second_order_needs_sequences(world: Path) -> None:
+    train_lm([world / "model/sentences"], world / "sentences", vocabulary=world / "tokens/vocab.txt")
+    run = world / "tokens/run3.tsv", "-m", world / "sentences", "--method"
+    assert decode(*run, "naive-bayes").exit_code == 0
+    result = decode(*run, "second-order")
+    assert result.exit_code == 1
+    assert "second-order learns how places follow each other" in result.stderr
