@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from placerec.baselines import majority, naive_bayes
+from placerec.baselines import dubois2011, majority, mtd, naive_bayes, wu2009
 from placerec.baselines.lesson import Follow, Lesson
 from placerec.hohmm import Emissions
 
@@ -21,6 +21,9 @@ METHODS: dict[str, Method] = {
     HOHMM: Method(),
     "majority": Method(follow=majority.fit),
     "naive-bayes": Method(follow=naive_bayes.fit),
+    "wu2009": Method(emissions=wu2009.fit),
+    "dubois2011": Method(emissions=dubois2011.fit),
+    "mtd": Method(emissions=mtd.fit),
 }
 # What words alone do not tell; `compare` runs these.
 NEED_DESCRIPTORS = ("torralba2003", "pronobis2007", "ullah2008", "knn")

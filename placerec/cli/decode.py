@@ -15,11 +15,21 @@ from placerec.cli.options import (
     output_option,
     progress_bar,
     talk_options,
+    usage,
     words_option,
 )
 
 if TYPE_CHECKING:
     from placerec.model import Decoding
+
+# What stands in placerec.baselines.METHODS, where reading it would load numpy.
+METHODS = (
+    "majority",
+    "naive-bayes",
+    "wu2009",
+    "dubois2011",
+    "mtd",
+)
 
 
 @click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
@@ -29,6 +39,13 @@ if TYPE_CHECKING:
 @format_option(" of images")
 @decoding_options("viterbi")
 @click.option("--viterbi", is_flag=True, help="Write the most probable path as best.")
+@click.option(
+    "--method",
+    metavar="NAME",
+    default="hohmm",
+    show_default=True,
+    help=f"What turns words into beliefs: hohmm, {', '.join(METHODS)}.",
+)
 @click.option(
     "--scorer",
     type=click.Choice(["native", "kenlm"]),
@@ -46,6 +63,7 @@ def decode(
     model: Path,
     words: Path | None,
     format_: str,
+    method: str,
     scorer: str,
     as_json: bool,
     out: Path | None,
@@ -56,9 +74,12 @@ def decode(
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, images. `-` reads one word a
     line (or word, tab, seconds) and answers each at once.
     """
-    from placerec.model import decode as run
-    from placerec.model import decode_lines, format_beliefs, load_recognizer
+    from placerec.baselines import check_method, load_decoder
+    from placerec.baselines import decode as run
+    from placerec.model import decode_lines, format_beliefs
 
+    with usage("--method"):
+        check_method(method, options, scorer=scorer)
     if tokens == (Path("-"),):
         if words or out:
             raise click.UsageError("`-` reads words and answers on stdout: it takes neither -w nor -o")
@@ -68,7 +89,7 @@ def decode(
             raise click.UsageError(
                 "`-` answers each line before later words are known: it takes none of --smooth, --viterbi, --lag"
             )
-        recognizer = load_recognizer(model, options=options, scorer=scorer)
+        recognizer = load_decoder(method, model, options=options, scorer=scorer)
         for line in decode_lines(recognizer, sys.stdin, as_json=as_json):
             click.echo(line)
         return
@@ -78,6 +99,7 @@ def decode(
         beliefs = run(
             tokens,
             model,
+            method=method,
             words=words,
             out=out,
             format=format_,
