@@ -22,7 +22,7 @@ from placerec.hohmm import Transition, filter_stream, learned_transition
 
 PROTOTYPES = 100
 # Widths that are tried, in units of the root mean square distance of the training frames from their mean.
-WIDTHS = tuple(2.0 ** (-j / 2) for j in range(13))
+WIDTHS: tuple[float, ...] = tuple(2.0 ** (-j / 2) for j in range(13))
 _SMALLEST_BELIEF = 1e-15
 LN10 = float(np.log(10))
 
