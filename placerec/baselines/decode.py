@@ -31,7 +31,7 @@ def check_method(name: str, options: Decoding = PAPER, *, scorer: str = "native"
     if METHODS[name].emissions is None:
         strange = [f.name for f in fields(options) if f.name != "max_gap" and getattr(options, f.name) != f.default]
         if strange:
-            raise ModelError(f"{name} has no filter of places that follow each other: it takes no {strange[0]}")
+            raise ModelError(f"{name} works without the filter, to which {strange[0]} belongs; leave it out")
 
 
 def make_decoder(

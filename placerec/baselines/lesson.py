@@ -27,8 +27,10 @@ class Lesson:
     """C places, V words; `sentences`: per place its visits, each the indices of its selected words, int64 (length,).
 
     `prior` float64 (C,): how probable each place is before anything is seen. `delta`: what is added to every count.
-    `steps` int64 (C, C): how often a frame at one place was followed by one at the other; None where sentences were
-    learned. `models`: the n-gram models of the places, of order `order`; empty where there are none.
+    `steps` int64 (C, C): how often a frame at one place was followed by one at the other; `triples` int64 (C, C, C):
+    how often a visit to one place (second index) came from another (first) and led to another (third). Both are None
+    where sentences were learned. `models`: the n-gram models of the places, of order `order`; empty where there are
+    none.
     """
 
     places: tuple[str, ...]
@@ -38,6 +40,7 @@ class Lesson:
     order: int = 2
     delta: float = 1.0
     steps: Ints | None = field(default=None, repr=False)
+    triples: Ints | None = field(default=None, repr=False)
     models: Mapping[str, BackoffModel] = field(default_factory=dict, repr=False)
 
     @property
@@ -55,6 +58,7 @@ def make_lesson(
     order: int = 2,
     delta: float = 1.0,
     steps: Ints | None = None,
+    triples: Ints | None = None,
     models: Mapping[str, BackoffModel] | None = None,
 ) -> Lesson:
     """The lesson of sentences per place; the prior is in proportion to their words, with 1/C added for each place.
@@ -71,7 +75,7 @@ def make_lesson(
         raise ModelError(f"the word {error} of the sentences is not in the vocabulary; train the model again") from None
     words = np.array([sum(map(len, visits)) for visits in numbered], np.float64)
     prior = (words + 1 / len(words)) / (words.sum() + 1)
-    return Lesson(tuple(sentences), tuple(vocabulary), numbered, prior, order, delta, steps, models or {})
+    return Lesson(tuple(sentences), tuple(vocabulary), numbered, prior, order, delta, steps, triples, models or {})
 
 
 def read_lesson(model: PlaceModels) -> Lesson:
@@ -87,6 +91,7 @@ def read_lesson(model: PlaceModels) -> Lesson:
         order=int(model.description["order"]),
         delta=float(model.description["delta"]) if added else 1.0,
         steps=record.transitions,
+        triples=record.triples,
         models=model.models,
     )
 

@@ -3,7 +3,18 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from placerec.baselines import dubois2011, majority, mtd, naive_bayes, wu2009
+from placerec.baselines import (
+    dubois2011,
+    filliat2008,
+    guillaume2011,
+    majority,
+    mtd,
+    naive_bayes,
+    pronobis2010,
+    ranganathan2010,
+    second_order,
+    wu2009,
+)
 from placerec.baselines.lesson import Follow, Lesson
 from placerec.hohmm import Emissions
 
@@ -23,7 +34,12 @@ METHODS: dict[str, Method] = {
     "naive-bayes": Method(follow=naive_bayes.fit),
     "wu2009": Method(emissions=wu2009.fit),
     "dubois2011": Method(emissions=dubois2011.fit),
+    "guillaume2011": Method(follow=guillaume2011.fit),
+    "pronobis2010": Method(follow=pronobis2010.fit),
+    "ranganathan2010": Method(follow=ranganathan2010.fit),
+    "filliat2008": Method(follow=filliat2008.fit),
     "mtd": Method(emissions=mtd.fit),
+    "second-order": Method(follow=second_order.fit),
 }
 # What words alone do not tell; `compare` runs these.
 NEED_DESCRIPTORS = ("torralba2003", "pronobis2007", "ullah2008", "knn")

@@ -28,7 +28,12 @@ METHODS = (
     "naive-bayes",
     "wu2009",
     "dubois2011",
+    "guillaume2011",
+    "pronobis2010",
+    "ranganathan2010",
+    "filliat2008",
     "mtd",
+    "second-order",
 )
 
 

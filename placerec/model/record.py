@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from placerec.errors import ModelError
 from placerec.hohmm.distances import Histogram, add_histograms, distance_histogram
-from placerec.words import Sentences, WordStream, place_steps
+from placerec.words import Sentences, WordStream, place_steps, place_triples
+
+Steps = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -25,14 +27,16 @@ class LearnedSequence:
 class Record:
     """The training sequences in order, and what was counted in them beside n-grams.
 
-    `transitions` int64 (C, C), places in alphabetical order: see `placerec.words.place_steps`. `distances`: per place.
-    Both are None where sentences were learned, not token streams. `dictionary`: the fingerprint, None if unknown.
+    `transitions` int64 (C, C), places in alphabetical order: see `placerec.words.place_steps`; `triples` int64 (C, C,
+    C): see `place_triples` there. `distances`: per place. The three are None where sentences were learned, not token
+    streams. `dictionary`: the fingerprint, None if unknown.
     """
 
     sequences: tuple[LearnedSequence, ...] = ()
     dictionary: str | None = None
-    transitions: NDArray[np.int64] | None = field(default=None, repr=False)
+    transitions: Steps | None = field(default=None, repr=False)
     distances: Mapping[str, Histogram] | None = field(default=None, repr=False)
+    triples: Steps | None = field(default=None, repr=False)
 
     @property
     def places(self) -> list[str]:
@@ -57,15 +61,17 @@ def record_streams(
         for stream, its in zip(streams, sentences, strict=True)
     )
     places = Record(learned).places
-    transitions = np.zeros((len(places), len(places)), np.int64)
+    transitions = np.zeros((len(places),) * 2, np.int64)
+    triples = np.zeros((len(places),) * 3, np.int64)
     distances: dict[str, Histogram] = {place: {} for place in places}
     for stream, sequence in zip(streams, learned, strict=True):
         transitions += place_steps(stream, places)
+        triples += place_triples(stream, places)
         labels = np.array(stream.places, np.str_)
         for place in sequence.visits:
             histogram = distance_histogram(stream.distances[labels == place])
             distances[place] = add_histograms(distances[place], histogram)
-    return Record(learned, dictionary, transitions, distances)
+    return Record(learned, dictionary, transitions, distances, triples)
 
 
 def add_record(record: Record, new: Record) -> Record:
@@ -87,25 +93,29 @@ def _counted(result: Record, record: Record, other: Record, sign: int) -> Record
     if its is None or others is None:
         return result
     places = sorted({*record.places, *other.places})
-    steps = _spread(record, places) + sign * _spread(other, places)
+    steps = [_spread(mine, record.places, places) for mine in (record.transitions, record.triples)]
+    for total, theirs in zip(steps, (other.transitions, other.triples), strict=True):
+        total += sign * _spread(theirs, other.places, places)
     histograms = {place: add_histograms(its.get(place, {}), others.get(place, {}), sign) for place in places}
     left = set(result.places)
-    kept = np.array([place in left for place in places], bool)
+    kept = [i for i, place in enumerate(places) if place in left]
     lost = [histograms.pop(place) for place in places if place not in left]
     counts = [count for histogram in histograms.values() for count in histogram.values()]
-    if steps.min() < 0 or steps[~kept].any() or steps[:, ~kept].any() or any(lost) or min(counts, default=0) < 0:
+    transitions, triples = (total[np.ix_(*[kept] * total.ndim)] for total in steps)
+    gone = transitions.sum() < steps[0].sum() or triples.sum() < steps[1].sum()
+    if gone or any(lost) or min(counts, default=0) < 0 or any(total.min() < 0 for total in steps):
         names = ", ".join(other.names)
         raise ModelError(
             f"{names}: the labels, times or distances are not those that were learned; give them as they were"
         )
-    return Record(result.sequences, result.dictionary, steps[np.ix_(kept, kept)], histograms)
+    return Record(result.sequences, result.dictionary, transitions, histograms, triples)
 
 
-def _spread(record: Record, places: Sequence[str]) -> NDArray[np.int64]:
-    """The steps of a record between `places`, which hold its own."""
-    spread = np.zeros((len(places), len(places)), np.int64)
-    at = [places.index(place) for place in record.places]
-    spread[np.ix_(at, at)] = 0 if record.transitions is None else record.transitions
+def _spread(steps: Steps | None, places: Sequence[str], wider: Sequence[str]) -> Steps:
+    """Counts (C, C) or (C, C, C) between `places` as counts between `wider` ones, which hold them."""
+    assert steps is not None
+    spread = np.zeros((len(wider),) * steps.ndim, np.int64)
+    spread[np.ix_(*[[wider.index(place) for place in places]] * steps.ndim)] = steps
     return spread
 
 
@@ -115,10 +125,18 @@ def describe_record(record: Record) -> dict[str, Any]:
     return {
         "sequences": [{"name": s.name, "visits": dict(s.visits)} for s in record.sequences],
         "dictionary": record.dictionary,
-        "transitions": None if record.transitions is None else {"counts": record.transitions.tolist()},
+        "transitions": _describe_steps(record),
         "distances": distances
         and {place: {str(b): count for b, count in histogram.items()} for place, histogram in distances.items()},
     }
+
+
+def _describe_steps(record: Record) -> dict[str, Any] | None:
+    if record.transitions is None or record.triples is None:
+        return None
+    seen = np.argwhere(record.triples)
+    triples = [[*route, int(record.triples[tuple(route)])] for route in seen.tolist()]
+    return {"counts": record.transitions.tolist(), "triples": triples}
 
 
 def read_record(path: Path, description: Mapping[str, Any]) -> Record:
@@ -132,8 +150,9 @@ def read_record(path: Path, description: Mapping[str, Any]) -> Record:
         if Record(learned).places != places or (steps is None) != (known is None):
             raise ValueError(places)
         transitions = steps and np.array([[*map(_count, row)] for row in steps["counts"]], np.int64)
+        triples = steps and _read_triples(steps["triples"], len(places))
         distances = known and {place: {int(b): _count(n) for b, n in known[place].items()} for place in places}
-        record = Record(learned, description["dictionary"], transitions, distances)
+        record = Record(learned, description["dictionary"], transitions, distances, triples)
         if transitions is not None and transitions.shape != (len(places), len(places)):
             raise ValueError(transitions.shape)
         return record
@@ -142,6 +161,16 @@ def read_record(path: Path, description: Mapping[str, Any]) -> Record:
             f"{path}: does not say which visits were learned, as an older placerec or an editor leaves it; "
             "train the model again"
         ) from error
+
+
+def _read_triples(listed: Any, C: int) -> Steps:
+    triples = np.zeros((C, C, C), np.int64)
+    for entry in listed:
+        i, j, k, count = map(_count, entry)
+        if max(i, j, k) >= C or j in (i, k):
+            raise ValueError(entry)
+        triples[i, j, k] = count
+    return triples
 
 
 def _count(value: Any) -> int:

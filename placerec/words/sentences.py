@@ -68,6 +68,24 @@ def place_steps(stream: WordStream, places: Sequence[str]) -> NDArray[np.int64]:
     return steps.reshape(len(places), len(places))
 
 
+def place_triples(stream: WordStream, places: Sequence[str]) -> NDArray[np.int64]:
+    """int64 (C, C, C): how often a visit to places[j] came from one to places[i] and led to one to places[k].
+
+    The frames from one to the next are those that `continues` connects; `places` must hold every label of the stream.
+    """
+    index = {place: i for i, place in enumerate(places)}
+    triples = np.zeros((len(places),) * 3, np.int64)
+    route: list[int] = []
+    for place, continued in zip(stream.places, continues(stream).tolist(), strict=True):
+        if not continued:
+            route = []
+        if place and route[-1:] != [index[place]]:
+            route = [*route[-2:], index[place]]
+            if len(route) == 3:
+                triples[tuple(route)] += 1
+    return triples
+
+
 def sentences_per_place(streams: Iterable[WordStream], selection: Selection) -> dict[str, Sentences]:
     """The sentences of every place in the streams, places in alphabetical order.
 

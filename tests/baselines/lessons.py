@@ -11,6 +11,7 @@ from placerec.lm import count_ngrams
 from placerec.model import Options, estimate_place
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 def lesson_of(
@@ -18,8 +19,8 @@ def lesson_of(
     words: int,
     *,
     order: int = 2,
-    delta: float = 1.0,
-    steps: Sequence[Sequence[int]] | None = None,
+    steps: Ints | None = None,
+    triples: Ints | None = None,
 ) -> Lesson:
     """Places p0, p1... of sentences of word numbers; words w0, w1..."""
     text = {f"p{c}": [[f"w{w}" for w in visit] for visit in visits] for c, visits in enumerate(sentences)}
@@ -28,22 +29,24 @@ def lesson_of(
         place: estimate_place(count_ngrams(visits, order, vocabulary=vocabulary), Options(order))
         for place, visits in text.items()
     }
-    counted = None if steps is None else np.array(steps, np.int64)
-    return make_lesson(text, vocabulary, order=order, delta=delta, steps=counted, models=models)
+    return make_lesson(text, vocabulary, order=order, steps=steps, triples=triples, models=models)
 
 
 def followed(follow: Follow, words: Sequence[int], elapsed: Sequence[int] | None = None) -> Floats:
     """The beliefs (T, C) after each word; 1 frame between words by default."""
     step = follow()
     frames = [min(i, 1) for i in range(len(words))] if elapsed is None else elapsed
-    return np.array([step(word, frame) for word, frame in zip(words, frames, strict=True)])
+    return np.array([step(word, frame).copy() for word, frame in zip(words, frames, strict=True)])
 
 
 @st.composite
 def lessons(draw: st.DrawFn, places: int = 4, words: int = 5) -> Lesson:
-    """One place or more, some of them empty."""
+    """One place or more, some of them empty; steps and triples that need not fit each other."""
     C, V = draw(st.integers(1, places)), draw(st.integers(1, words))
     visit = st.lists(st.integers(0, V - 1), min_size=1, max_size=8)
     sentences = draw(st.lists(st.lists(visit, max_size=3), min_size=C, max_size=C))
-    row = st.lists(st.integers(0, 20), min_size=C, max_size=C)
-    return lesson_of(sentences, V, steps=draw(st.lists(row, min_size=C, max_size=C)))
+    rng = np.random.default_rng(draw(st.integers(0, 99)))
+    triples = rng.integers(0, 4, (C, C, C))
+    for c in range(C):
+        triples[c, c, :] = triples[:, c, c] = 0
+    return lesson_of(sentences, V, steps=rng.integers(0, 20, (C, C)), triples=triples)

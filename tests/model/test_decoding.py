@@ -57,7 +57,7 @@ def test_a_model_that_did_not_see_sequences_cannot_have_learned(world: Path) -> 
     with pytest.raises(ModelError, match=r"other: was trained on sentences, .*; train it on token streams, or "):
         decode([world / "tokens/run3.tsv"], world / "other", options=learned)
     description = json.loads(path.read_text())
-    for broken in ({"counts": [[1, 2], [3, 4]]}, {"counts": [[1, 2, -3]] * 3}, 7, None):
+    for broken in ({"counts": [[1, 2], [3, 4]], "triples": []}, {"counts": [[1, 2, -3]] * 3, "triples": []}, 7, None):
         path.write_text(json.dumps(description | {"transitions": broken}))
         belief(world, Decoding())
         with pytest.raises(ModelError, match=r"model\.json: does not say .*; train the model again"):

@@ -88,7 +88,7 @@ def test_a_model_without_delta_does_not_name_one(tmp_path: Path) -> None:
 def test_model_json_tells_all_options(tmp_path: Path) -> None:
     options = Options(3, "lidstone-backoff", 0.5, (1, 2), False, Selection("unique"))
     sequences = (LearnedSequence("run2", {"kitchen": 2}), LearnedSequence("run1", {"kitchen": 0}))
-    record = Record(sequences, "f00", np.array([[7]]), {"kitchen": {-3: 8, 2: 1}})
+    record = Record(sequences, "f00", np.array([[7]]), {"kitchen": {-3: 8, 2: 1}}, np.zeros((1, 1, 1), np.int64))
     train_model(KITCHEN, ("a", "b"), tmp_path, options=options, record=record)
     assert json.loads((tmp_path / "model.json").read_text()) == {
         "format": "placerec model 1",
@@ -103,7 +103,7 @@ def test_model_json_tells_all_options(tmp_path: Path) -> None:
         "vocabulary": 2,
         "sequences": [{"name": "run2", "visits": {"kitchen": 2}}, {"name": "run1", "visits": {"kitchen": 0}}],
         "dictionary": "f00",
-        "transitions": {"counts": [[7]]},
+        "transitions": {"counts": [[7]], "triples": []},
         "distances": {"kitchen": {"-3": 8, "2": 1}},
         "calibration": None,
         "ngram_count": {

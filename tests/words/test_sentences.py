@@ -13,6 +13,7 @@ from placerec.words import (
     format_sentences,
     parse_selection,
     place_steps,
+    place_triples,
     read_sentences,
     sentences_per_place,
     time_gaps,
@@ -50,6 +51,19 @@ def test_steps_are_counted_inside_labelled_runs() -> None:
     times = [0, 0.2, 0.4, 60, 60.2, 61.2]
     assert place_steps(stream("a b c d e f", "K K L K K L", times), ["K", "L"]).tolist() == [[2, 2], [0, 0]]
     assert place_steps(stream("", ""), []).tolist() == []
+
+
+def test_triples_are_visits_one_after_the_other() -> None:
+    def listed(labels: str, times: list[float] | None = None) -> dict[str, int]:
+        found = place_triples(stream(" ".join("a" * len(labels.split())), labels, times), ["J", "K", "L"])
+        return {"".join("JKL"[i] for i in route): int(found[tuple(route)]) for route in np.argwhere(found).tolist()}
+
+    assert listed("J J K K K L J K L") == {"JKL": 2, "KLJ": 1, "LJK": 1}
+    assert listed("J K J K") == {"JKJ": 1, "KJK": 1}
+    # Without a label, or after a gap in time, nobody knows where one came from.
+    assert listed("J K - L J K") == {"LJK": 1}
+    assert listed("J K L J K L", [0, 1, 60, 61, 62, 63]) == {"LJK": 1, "JKL": 1}
+    assert listed("J K K") == {}
 
 
 @given(st.lists(st.tuples(st.sampled_from(["", "K", "L"]), st.sampled_from([0.0, 1.0, 1.0, 1.5, 99.0])), max_size=30))
