@@ -1,6 +1,6 @@
 """The tables of docs/systems.md: every method on every set, by `placerec compare` for five maps and every fold.
 
-python docs/make/systems.py DATA/SET... -o docs/systems [--test GLOB ...] [--work DIR]
+python docs/make/systems.py DATA/SET... -o docs/systems [--test GLOB ...] [--size S] [--work DIR]
 
 Sequences that a GLOB names are tested together, all others train; in a set without any, each sequence is tested in turn
 and the others train. For every set: methods.csv (means over the maps; latency is a mean of medians), pairs.csv and
@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
-from placerec.evaluation.compare import Comparison, MethodScore, compare, format_methods, format_pairs, judge
+from placerec.evaluation.compare import SIZE, Comparison, MethodScore, compare, format_methods, format_pairs, judge
 from placerec.evaluation.compare_plot import plot_comparison
 from placerec.evaluation.contest import ALL, Run
 from placerec.evaluation.material import Front
@@ -68,14 +68,14 @@ def mean_of(found: Sequence[Comparison], rights: Sequence[dict[str, np.ndarray]]
     return replace(found[0], scores=tuple(scores), pairs=pairs, front=Front(*np.mean(fronts, axis=0).tolist()))
 
 
-def compared(folder: Path, test: Sequence[str], work: Path) -> Comparison:
+def compared(folder: Path, test: Sequence[str], size: int, work: Path) -> Comparison:
     """A set's comparison."""
     found, rights, frames = [], [], np.empty(0, np.int64)
     for seed in SEEDS:
         parts = []
         for number, tests in enumerate(folds(folder, test)):
-            out = work / folder.name / f"seed{seed}-fold{number}"
-            parts.append((out, compare([folder], tests, out, seed=seed, cache=work / "cache")))
+            out = work / folder.name / f"size{size}-seed{seed}-fold{number}"
+            parts.append((out, compare([folder], tests, out, size=size, seed=seed, cache=work / "cache")))
         runs = together(parts, seed)
         found.append(judge(runs, parts[0][1].front, seed))
         rights.append({name: count_blocks(run.beliefs)[1] for name, run in runs.items()})
@@ -87,19 +87,21 @@ def compared(folder: Path, test: Sequence[str], work: Path) -> Comparison:
 def table(folder: Path, found: Comparison) -> str:
     """A set's table, best first."""
     number, what = found.drawn
+    front = f"descriptor {found.front.descriptor / 1000:.1f} ms, word {found.front.word:.0f} µs"
     lines = [
         f"{folder.name}: {found.frames} test frames, {number} {what}; always `{found.majority_place}`: "
-        f"{100 * found.majority:.1f} %; descriptor {found.front.descriptor / 1000:.1f} ms, word {found.front.word:.0f} µs\n",
+        f"{100 * found.majority:.1f} %; {front}\n",
         "| method | accuracy % | 95 % interval | balanced % | latency | ECE | µs a frame |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for score in sorted(found.scores, key=lambda score: -score.accuracy):
         latency = "–" if score.change_latency_frames is None else f"{score.change_latency_frames:.1f}"
-        asked = "" if score.consulted is None else f" (asks twice for {100 * score.consulted:.0f} %)"
+        asked = "" if score.consulted is None else f" (asks again for {100 * score.consulted:.0f} %)"
+        low, high = 100 * score.accuracy_low, 100 * score.accuracy_high
         lines.append(
-            f"| `{score.method}`{asked} | {100 * score.accuracy:.1f} "
-            f"| {100 * score.accuracy_low:.1f} to {100 * score.accuracy_high:.1f} | {100 * score.balanced_accuracy:.1f} "
-            f"| {latency} | {score.ece:.3f} | {score.microseconds_per_frame:.0f} |"
+            f"| `{score.method}`{asked} | {100 * score.accuracy:.1f} | {low:.1f} to {high:.1f} "
+            f"| {100 * score.balanced_accuracy:.1f} | {latency} "
+            f"| {score.ece:.3f} | {score.microseconds_per_frame:.0f} |"
         )
     return "\n".join(lines) + "\n\n"
 
@@ -108,12 +110,13 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", metavar="DATA/SET", nargs="+", type=Path)
     parser.add_argument("--test", metavar="GLOB", action="append", default=[], help="names of the test sequences")
+    parser.add_argument("--size", type=int, default=SIZE, help="side of the maps")
     parser.add_argument("-o", "--out", metavar="DIR", type=Path, required=True, help="where the tables go")
     parser.add_argument("--work", metavar="DIR", type=Path, default=Path("systems-work"), help="what is kept of runs")
     options = parser.parse_args()
     logging.disable(logging.WARNING)
     for data in options.data:
-        result = compared(data, options.test, options.work)
+        result = compared(data, options.test, options.size, options.work)
         write_text(options.out / data.name / "methods.csv", format_methods(result.scores))
         write_text(options.out / data.name / "pairs.csv", format_pairs(result.pairs))
         plot_comparison(result, options.out / data.name / "methods.png")

@@ -13,15 +13,19 @@ from numpy.typing import NDArray
 from placerec.baselines import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
 from placerec.baselines.views import PointFollow, Views
 from placerec.evaluation.material import Look, digest
-from placerec.hohmm import Beliefs, best_places
-from placerec.model import Decoding, Options, PlaceModels, load_model, train_model
+from placerec.hohmm import Beliefs, Recognizer, best_places
+from placerec.lm.union import unite_models
+from placerec.model import Decoder, Decoding, Options, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
+from placerec.version import __version__
 from placerec.words import Selection, WordStream, place_steps, sentences_per_place
 
 FIXED = f"{HOHMM}-fixed"
+# What `hohmm` is without the words before: its models' unigrams, its smoothing and transitions.
+MEMORYLESS = f"{HOHMM}-order1"
 CASCADE = "pronobis2007"
 # The paper's transitions where a system has a filter, unless its source learns them, or it stands beside `hohmm`.
-LEARNED = (HOHMM, "mtd")
+LEARNED = (HOHMM, MEMORYLESS, "mtd")
 # Each method is run so often over the test frames; the fastest run is told.
 RUNS = 3
 Floats = NDArray[np.float64]
@@ -35,7 +39,7 @@ POINT_METHODS: dict[str, Callable[[Views, int], PointFollow]] = {
     "knn": lambda views, seed: knn.fit(views),
 }
 # In the order of the table.
-ALL = (HOHMM, FIXED, *(name for name in METHODS if name != HOHMM), CASCADE, *POINT_METHODS)
+ALL = (HOHMM, FIXED, MEMORYLESS, *(name for name in METHODS if name != HOHMM), CASCADE, *POINT_METHODS)
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,8 @@ class Run:
 def train_models(look: Look, training: int, folder: Path) -> PlaceModels:
     """The n-gram models of the training sequences, with the default options, in a MODEL/ folder."""
     streams = look.streams[:training]
-    path = folder / f"model-{digest(*(x for s in streams for x in (s.name, s.places, s.words, s.times, s.distances)))}"
+    content = [part for s in streams for part in (s.name, s.places, s.words, s.times, s.distances)]
+    path = folder / f"model-{digest(look.dictionary.fingerprint, __version__, *content)}"
     if not path.exists():
         sentences = [sentences_per_place([stream], Selection()) for stream in streams]
         record = record_streams(streams, sentences, look.dictionary.fingerprint)
@@ -110,9 +115,29 @@ def run_method(name: str, contest: Contest) -> Run:
     return _timed(_decoder(name, contest.models), contest, [contest.look.streams[i].words for i in contest.tests])
 
 
+class _Unigrams:
+    """Emissions of the same models for words without those before them."""
+
+    def __init__(self, models: PlaceModels) -> None:
+        self._emissions = unite_models(list(models.models.values()))
+
+    def score(self, words: Sequence[str]) -> Floats:
+        """As `Emissions` has it."""
+        return np.concatenate([self._emissions.score([word]) for word in words])
+
+    def follow(self) -> Callable[[str], Sequence[float]]:
+        """As `Emissions` has it."""
+        return lambda word: self._emissions.follow()(word)
+
+
 def _decoder(name: str, models: PlaceModels) -> Follow:
     options = Decoding(transition="learned" if name in LEARNED else "fixed")
-    decoder = make_decoder(HOHMM if name == FIXED else name, models, options=options)
+    decoder: Decoder
+    if name == MEMORYLESS:
+        transition = transition_of(models, options)
+        decoder = Recognizer(models.models, transition=transition, emissions=_Unigrams(models))
+    else:
+        decoder = make_decoder(HOHMM if name == FIXED else name, models, options=options)
 
     def follow() -> Step:
         decoder.reset()
