@@ -30,6 +30,7 @@ _ROOMS = {
     ),
     "placerec.model": ("Decoding", "Options", "calibrate", "decode", "load_recognizer", "train_lm", "update"),
     "placerec.evaluation": ("evaluate", "evaluate_files"),
+    "placerec.evaluation.compare": ("compare",),
     "placerec.evaluation.look": ("show_frame", "show_words", "stability"),
     "placerec.lab": ("render_lab",),
 }
@@ -38,6 +39,7 @@ _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 if TYPE_CHECKING:
     from placerec.errors import PlacerecError
     from placerec.evaluation import evaluate, evaluate_files
+    from placerec.evaluation.compare import compare
     from placerec.evaluation.look import show_frame, show_words, stability
     from placerec.frames import Frame, Sequence, find_sequences, read_gray
     from placerec.hohmm import (
@@ -78,6 +80,7 @@ __all__ = [
     "__version__",
     "calibrate",
     "check_model",
+    "compare",
     "count_ngrams",
     "decode",
     "describe",

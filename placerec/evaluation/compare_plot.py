@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 # Inches.
 _WIDTH, _LEAST_HEIGHT = 10.0, 5.2
+_TITLE = 0.65
 # The height of a label in inches, and the least cost that is drawn, in microseconds.
 _LABEL, _LEAST = 0.19, 0.1
 _KINDS = ("words", "words, two dictionaries", "descriptors")
@@ -27,7 +28,7 @@ def plot_comparison(found: "Comparison", path: Path | str) -> None:
     height = max(_LEAST_HEIGHT, 1.6 + _LABEL * len(scores))
     with figure_file(path, _WIDTH, height) as figure:
         bottom = 1.0 / height
-        axes = figure.add_axes((0.08, bottom, 0.66, 1 - bottom - 0.55 / height))
+        axes = figure.add_axes((0.08, bottom, 0.66, 1 - bottom - _TITLE / height))
         _points(axes, scores)
         axes.axhline(found.majority, color="0.35", linewidth=1, linestyle=(0, (5, 3)), zorder=1)
         axes.text(
@@ -40,8 +41,8 @@ def plot_comparison(found: "Comparison", path: Path | str) -> None:
             va="bottom",
         )
         _limits(axes, found, scores)
-        _labels(axes, scores, height * (1 - bottom) - 0.55)
-        axes.set_title(f"Accuracy on {found.frames} test frames against the cost of a frame", loc="left", fontsize=11)
+        _labels(axes, scores, height * (1 - bottom) - _TITLE)
+        axes.set_title(f"Accuracy on {found.frames} test frames against cost", loc="left", fontsize=11, pad=12)
         figure.text(0.08, 0.12 / height, _caption(found), fontsize=7.5, color="0.3", va="bottom", linespacing=1.4)
 
 
@@ -75,7 +76,7 @@ def _points(axes: "Axes", scores: "list[MethodScore]") -> None:
     axes.set_xlabel("microseconds per frame, after the descriptor (logarithmic)", fontsize=8.5)
     axes.set_ylabel("accuracy, with 95 % interval", fontsize=8.5)
     if scores:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.36, 0.995), ncols=3, fontsize=7.5, frameon=False)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.36, 1.02), ncols=3, fontsize=7.5, frameon=False)
 
 
 def _limits(axes: "Axes", found: "Comparison", scores: "list[MethodScore]") -> None:
@@ -92,6 +93,7 @@ def _labels(axes: "Axes", scores: "list[MethodScore]", inches: float) -> None:
     """Names in a column on the right, in the order of accuracy and apart from each other, a thin line to each point."""
     low, high = axes.get_ylim()
     wanted = (np.array([s.accuracy for s in scores]) - low) / (high - low)
+    colours = place_colours(_KINDS).tolist()
     for score, at in zip(scores, spread(wanted, _LABEL / inches).tolist(), strict=True):
         point = (max(score.microseconds_per_frame, _LEAST), score.accuracy)
         axes.annotate(
@@ -102,7 +104,14 @@ def _labels(axes: "Axes", scores: "list[MethodScore]", inches: float) -> None:
             fontsize=8,
             va="center",
             annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": "0.75", "linewidth": 0.6, "shrinkA": 1, "shrinkB": 3},
+            arrowprops={
+                "arrowstyle": "-",
+                "color": (*colours[_KINDS.index(_kind(score))], 0.6),
+                "linewidth": 0.7,
+                "shrinkA": 1,
+                "shrinkB": 3,
+                "relpos": (0, 0.5),
+            },
         )
 
 
