@@ -31,7 +31,7 @@ from placerec.version import __version__
 
 ProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
 NEED_SKLEARN = ("ullah2008", "ullah2008-hmm", "knn")
-# The better of the two maps in the paper (its O1, as readings call it), with the smoothing that it found best there.
+# The larger of the paper's two maps, with which it recognises rooms better.
 SIZE = 20
 RUN_JSON = "run.json"
 OWNED = ("*.tsv", RUN_JSON)
@@ -246,12 +246,11 @@ def _run(name: str, contest: Contest, folder: Path) -> Run:
         contest.again.dictionary.fingerprint if contest.again and name == CASCADE else "",
         __version__,
     )
-    if (folder / RUN_JSON).exists():
-        known = json.loads(read_text(folder / RUN_JSON, EvaluationError))
-        if known.get("key") == key:
-            log.info("%s: as the run before left it", name)
-            beliefs = [read_beliefs(folder / f"{contest.look.streams[i].name}.tsv") for i in contest.tests]
-            return Run(beliefs, known["microseconds_per_frame"], known["consulted"])
+    known = _facts(folder / RUN_JSON)
+    if known.get("key") == key:
+        log.info("%s: as the run before left it", name)
+        beliefs = [read_beliefs(folder / f"{contest.look.streams[i].name}.tsv") for i in contest.tests]
+        return Run(beliefs, known["microseconds_per_frame"], known["consulted"])
     run = run_method(name, contest)
     with whole_folder(folder, OWNED) as partial:
         for beliefs_of_one in run.beliefs:
@@ -259,6 +258,15 @@ def _run(name: str, contest: Contest, folder: Path) -> Run:
         facts = {"key": key, "method": name, "microseconds_per_frame": run.microseconds, "consulted": run.consulted}
         write_text(partial / RUN_JSON, json.dumps(facts, indent=2) + "\n")
     return run
+
+
+def _facts(path: Path) -> dict[str, Any]:
+    """What a run.json holds; nothing if there is none, or none that can be read."""
+    try:
+        facts = json.loads(read_text(path, EvaluationError)) if path.exists() else {}
+    except ValueError:
+        facts = {}
+    return facts if isinstance(facts, dict) else {}
 
 
 def _tell(out: Path, found: Comparison) -> None:
