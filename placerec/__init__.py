@@ -28,8 +28,9 @@ _ROOMS = {
         "read_beliefs",
         "read_transitions",
     ),
-    "placerec.model": ("Decoding", "Options", "calibrate", "decode", "load_recognizer", "train_lm", "update"),
-    "placerec.evaluation": ("evaluate", "evaluate_files"),
+    "placerec.model": ("Decoding", "Options", "calibrate", "load_recognizer", "train_lm", "update"),
+    "placerec.baselines": ("decode", "load_decoder"),
+    "placerec.evaluation": ("evaluate", "evaluate_files", "inspect_decision"),
     "placerec.evaluation.compare": ("compare",),
     "placerec.evaluation.look": ("show_frame", "show_words", "stability"),
     "placerec.lab": ("render_lab",),
@@ -37,8 +38,9 @@ _ROOMS = {
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 
 if TYPE_CHECKING:
+    from placerec.baselines import decode, load_decoder
     from placerec.errors import PlacerecError
-    from placerec.evaluation import evaluate, evaluate_files
+    from placerec.evaluation import evaluate, evaluate_files, inspect_decision
     from placerec.evaluation.compare import compare
     from placerec.evaluation.look import show_frame, show_words, stability
     from placerec.frames import Frame, Sequence, find_sequences, read_gray
@@ -57,7 +59,7 @@ if TYPE_CHECKING:
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.checks import check_model
     from placerec.lm.inspection import inspect_model
-    from placerec.model import Decoding, Options, calibrate, decode, load_recognizer, train_lm, update
+    from placerec.model import Decoding, Options, calibrate, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
@@ -91,8 +93,10 @@ __all__ = [
     "find_sequences",
     "fixed_transition",
     "gist",
+    "inspect_decision",
     "inspect_model",
     "learned_transition",
+    "load_decoder",
     "load_recognizer",
     "parse_selection",
     "read_arpa",

@@ -13,8 +13,9 @@ import numpy as np
 from held_out import Floats, Trained, arguments, described, filtered, folds, part, trained
 
 from placerec.evaluation.confidence import new_places
+from placerec.hohmm import filter_stream
 from placerec.hohmm.distances import Histogram, distance_histogram
-from placerec.hohmm.unknown import UnknownModel, evidence, filter_unknown, unknown_model, word_runs
+from placerec.hohmm.unknown import CHAIN, UnknownModel, chain_evidence, evidence, unknown_model, word_runs
 from placerec.vision import Descriptors
 
 SCORES = ("1 - belief", "entropy", "distance", "words", "words, distance")
@@ -53,7 +54,8 @@ def scores(case: Trained) -> list[Floats]:
         def unknown(
             model: UnknownModel, log10_p: Floats = log10_p, before: Floats = before, far: Floats = stream.distances
         ) -> Floats:
-            return filter_unknown(evidence(model, log10_p, before, far), log10_p.shape[1])
+            chain = chain_evidence(evidence(model, log10_p, before, far), log10_p.shape[1])
+            return filter_stream(chain, CHAIN).belief[:, 0]
 
         entropy = -(after * np.log(np.maximum(after, 1e-300))).sum(axis=1)
         found.append(

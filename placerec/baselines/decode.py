@@ -2,17 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from placerec.baselines.follower import Follower
 from placerec.baselines.lesson import read_lesson
 from placerec.baselines.methods import HOHMM, METHODS, NEED_DESCRIPTORS
 from placerec.errors import ModelError
-from placerec.hohmm import Beliefs, Recognizer
+from placerec.hohmm import Beliefs
 from placerec.model import Decoder, Decoding, PlaceModels, load_model, make_recognizer
 from placerec.model import decode as decode_with
+from placerec.model.decode import Progress
 from placerec.model.decoding import PAPER
+from placerec.model.recognize import check_words
 
 if TYPE_CHECKING:
     from placerec.vision import Dictionary
@@ -27,11 +30,15 @@ def check_method(name: str, options: Decoding = PAPER, *, scorer: str = "native"
     if name == HOHMM:
         return
     if scorer != "native":
-        raise ModelError(f"{name} has no use for the language models: it takes no scorer")
-    if METHODS[name].emissions is None:
-        strange = [f.name for f in fields(options) if f.name != "max_gap" and getattr(options, f.name) != f.default]
-        if strange:
-            raise ModelError(f"{name} works without the filter, to which {strange[0]} belongs; leave it out")
+        raise ModelError(f"{name} has no use for another scorer of the language models; leave it out")
+    method, allowed = METHODS[name], {"max_gap"}
+    if method.emissions is not None:
+        allowed = {field.name for field in fields(options)} - {"calibrated", "explain"}
+    elif method.follow_unknown is not None:
+        allowed.add("unknown")
+    for field in fields(options):
+        if field.name not in allowed and getattr(options, field.name) != field.default:
+            raise ModelError(f"{name} has no use for {field.name.replace('_', '-')}; leave it out")
 
 
 def make_decoder(
@@ -48,23 +55,21 @@ def make_decoder(
     ModelError as `check_method`, `read_lesson` and `make_recognizer` do.
     """
     check_method(name, options, scorer=scorer)
-    # Also where it is not used: what is wrong with model, dictionary and transitions is found here.
-    recognizer = make_recognizer(model, options=options, dictionary=dictionary, scorer=scorer)
     method = METHODS[name]
-    if method.emissions is not None:
-        return Recognizer(
-            model.models,
-            selection=model.selection,
-            transition=recognizer.transition,
-            dictionary=dictionary,
-            max_gap=options.max_gap,
-            emissions=method.emissions(read_lesson(model)),
-        )
-    if method.follow is not None:
-        lesson = read_lesson(model)
-        follow = method.follow(lesson)
-        return Follower(lesson.places, lesson.vocabulary, follow, selection=model.selection, max_gap=options.max_gap)
-    return recognizer
+    fit = method.follow_unknown if options.unknown and method.follow_unknown else method.follow
+    if fit is None:
+        emissions = method.emissions and method.emissions(read_lesson(model))
+        return make_recognizer(model, options=options, dictionary=dictionary, scorer=scorer, emissions=emissions)
+    check_words(model, dictionary)
+    lesson = read_lesson(model)
+    return Follower(
+        lesson.places,
+        lesson.vocabulary,
+        fit(lesson),
+        selection=model.selection,
+        max_gap=options.max_gap,
+        unknown=options.unknown,
+    )
 
 
 def load_decoder(name: str, path: Path | str, *, options: Decoding = PAPER, scorer: str = "native") -> Decoder:
@@ -72,10 +77,29 @@ def load_decoder(name: str, path: Path | str, *, options: Decoding = PAPER, scor
     return make_decoder(name, load_model(path), options=options, scorer=scorer)
 
 
-def decode(sources: Sequence[Path | str], model: Path | str, *, method: str = HOHMM, **more: Any) -> list[Beliefs]:
-    """`placerec decode --method`: as `placerec.model.decode`, by the method of that name."""
-
-    def make(models: PlaceModels, **options: Any) -> Decoder:
-        return make_decoder(method, models, **options)
-
-    return decode_with(sources, model, make=make, **more)
+def decode(
+    sources: Sequence[Path | str],
+    model: Path | str,
+    *,
+    method: str = HOHMM,
+    words: Path | str | None = None,
+    out: Path | str | None = None,
+    format: str = "auto",
+    options: Decoding = PAPER,
+    scorer: str = "native",
+    as_json: bool = False,
+    progress: Progress | None = None,
+) -> list[Beliefs]:
+    """`placerec decode`: as `placerec.model.decode`, by the `method` of that name (METHODS)."""
+    return decode_with(
+        sources,
+        model,
+        words=words,
+        out=out,
+        format=format,
+        options=options,
+        scorer=scorer,
+        as_json=as_json,
+        progress=progress,
+        make=partial(make_decoder, method),
+    )

@@ -19,6 +19,7 @@ class Follower:
 
     Before the first selected word all places are equally probable; a word that the selection skips, or that the
     vocabulary lacks, leaves the belief as it is. More than `max_gap` seconds between two frames begin a new sequence.
+    `unknown`: the beliefs of `follow` have one column more, the probability that the place is none of `places`.
     """
 
     unexplained = 0  # Every word has a probability everywhere.
@@ -31,10 +32,12 @@ class Follower:
         *,
         selection: Selection = Selection(),
         max_gap: float | None = None,
+        unknown: bool = False,
     ) -> None:
         self.places = tuple(places)
         self.selection = selection
         self.max_gap = max_gap
+        self.unknown = unknown or None
         self._index = {word: i for i, word in enumerate(vocabulary)}
         self._follow = follow
         self.reset()
@@ -44,17 +47,19 @@ class Follower:
 
     def reset(self) -> None:
         """Forget the sequence so far."""
-        self._belief = np.full(len(self.places), 1 / len(self.places))
+        columns = len(self.places) + bool(self.unknown)
+        self._belief = np.full(columns, 1 / columns)
         self._step = self._follow()
         self._keep = selector(self.selection)
         self._time: float | None = None
         # Frames since the last selected word; None before the first.
         self._since: int | None = None
 
-    def update(self, word: str, time: float | None = None) -> Belief:
+    def update(self, word: str, /, time: float | None = None, distance: float | None = None) -> Belief:
         """The belief after one more frame and its word; `time` in seconds, needed with a largest gap.
 
-        Raises ModelError for a word that the vocabulary lacks, and for a time that is needed and missing or goes back.
+        `distance` is what a `Recognizer` takes, too; it says nothing here. Raises ModelError for a word that the
+        vocabulary lacks, and for a time that is needed and missing or goes back.
         """
         if word not in self._index:
             raise ModelError(f"the word {word!r} is not in the models' vocabulary")
@@ -65,12 +70,12 @@ class Follower:
         if selected:
             self._belief = self._step(self._index[word], self._since or 0)
             self._since = 0
-        return Belief(self.places, self._belief.copy(), word, selected)
+        return self._believed(word, selected)
 
     def skip(self, time: float | None = None) -> Belief:
         """The belief after one more frame that has no word: it is held, but the frame and its time count."""
         self._pass(time)
-        return Belief(self.places, self._belief.copy(), "", False)
+        return self._believed("", False)
 
     def decode(self, stream: WordStream) -> Beliefs:
         """The beliefs over a whole sequence: those that `update` gives from a reset.
@@ -84,13 +89,14 @@ class Follower:
             message = "%s: words that the models do not list: %d skipped, %r first"
             log.warning(message, stream.name, len(strange), strange[0])
         selected = np.zeros(len(stream), bool)
-        belief = np.empty((len(stream), len(self.places)))
+        belief, unknown = np.empty((len(stream), len(self.places))), np.zeros(len(stream))
         for i, (word, time) in enumerate(zip(stream.words, stream.times.tolist(), strict=True)):
             try:
                 answer = self.update(word, time) if word in self else self.skip(time)
             except ModelError as error:
                 raise StreamError(f"{stream.name}: frame {stream.frames[i]!r}: {error}") from error
-            selected[i], belief[i] = answer.selected, answer.probability
+            selected[i], belief[i], unknown[i] = answer.selected, answer.probability, answer.unknown or 0
+        asked = unknown if self.unknown else None
         return Beliefs(
             stream.name,
             self.places,
@@ -99,9 +105,16 @@ class Follower:
             stream.places,
             stream.words,
             selected,
-            best_places(self.places, belief),
+            best_places(self.places, belief.argmax(axis=1), asked),
             belief,
+            asked,
         )
+
+    def _believed(self, word: str, selected: bool) -> Belief:
+        if not self.unknown:
+            return Belief(self.places, self._belief.copy(), word, selected)
+        known = self._belief[:-1]
+        return Belief(self.places, known / known.sum(), word, selected, float(self._belief[-1]))
 
     def _pass(self, time: float | None) -> None:
         """Take note of one more frame; after a gap everything starts anew."""

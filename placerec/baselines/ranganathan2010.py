@@ -34,7 +34,7 @@ def fit(lesson: Lesson, *, concentration: float = CONCENTRATION, most: int = MOS
     def follow() -> Step:
         # Of the beginnings that are kept: joint probability with the places, words of the segment so far.
         weights = np.zeros((most, len(start)))
-        counts = np.zeros((most, V))
+        counts, totals = np.zeros((most, V)), np.zeros((most, 1))
         begun = 0
 
         def step(word: int, elapsed: int) -> Floats:
@@ -42,13 +42,12 @@ def fit(lesson: Lesson, *, concentration: float = CONCENTRATION, most: int = MOS
             same = go_on**elapsed
             row = begun if begun < most else int(weights.sum(axis=1).argmin())
             weights[:begun] *= same
-            weights[row], counts[row] = (1 - same if begun else 1.0) * start, 0
+            weights[row], counts[row], totals[row] = (1 - same if begun else 1.0) * start, 0, 0
             begun = min(begun + 1, most)
-            seen = counts[:begun]
-            likelihood = (seen[:, word, None] + alpha[word]) / (seen.sum(axis=1, keepdims=True) + concentration)
-            weights[:begun] *= likelihood
+            weights[:begun] *= (counts[:begun, word, None] + alpha[word]) / (totals[:begun] + concentration)
             weights[:begun] /= weights[:begun].sum()
-            seen[:, word] += 1
+            counts[:begun, word] += 1
+            totals[:begun] += 1
             belief: Floats = weights[:begun].sum(axis=0)
             belief /= belief.sum()
             return belief

@@ -42,8 +42,11 @@ METHODS = (
 @click.option("-m", "--model", metavar="MODEL/", type=PATH, required=True, help="The folder of train-lm.")
 @words_option(False, "The dictionary, if TOKENS are images.")
 @format_option(" of images")
-@decoding_options("viterbi")
+@decoding_options("viterbi", "calibrated", "unknown", "explain")
 @click.option("--viterbi", is_flag=True, help="Write the most probable path as best.")
+@click.option("--calibrated", is_flag=True, help="Apply what `placerec calibrate` found to the beliefs.")
+@click.option("--unknown", is_flag=True, help="Add a column: the probability that the place is none of the model's.")
+@click.option("--explain", is_flag=True, help="Write NAME.explain.jsonl beside the beliefs: what decided each word.")
 @click.option(
     "--method",
     metavar="NAME",
@@ -77,7 +80,7 @@ def decode(
     """Find the belief over places for every frame.
 
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, images. `-` reads one word a
-    line (or word, tab, seconds) and answers each at once.
+    line (or word, tab, seconds, tab, distance) and answers each at once.
     """
     from placerec.baselines import check_method, load_decoder
     from placerec.baselines import decode as run
@@ -86,6 +89,8 @@ def decode(
     with usage("--method"):
         check_method(method, options, scorer=scorer)
     if tokens == (Path("-"),):
+        if options.explain:
+            raise click.UsageError("`-` answers on stdout and writes no files: it takes no --explain")
         if words or out:
             raise click.UsageError("`-` reads words and answers on stdout: it takes neither -w nor -o")
         if sys.stdin is None:
@@ -100,6 +105,8 @@ def decode(
         return
     if Path("-") in tokens:
         raise click.UsageError("`-` cannot be mixed with files")
+    if options.explain and out is None:
+        raise click.UsageError("--explain writes files beside the beliefs: it needs -o")
     with progress_bar("describe") as progress:
         beliefs = run(
             tokens,

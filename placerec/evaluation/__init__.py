@@ -1,6 +1,7 @@
 """Beliefs into knowledge: numbers, pictures and pages."""
 
 from placerec.evaluation.curves import coverage_panel, reliability_panel, roc_panel
+from placerec.evaluation.decision import decision_page, format_decision, inspect_decision
 from placerec.evaluation.metrics import Evaluation, PlaceScore, SequenceScore, evaluate
 from placerec.evaluation.panels import belief_strip, confusion_panel, figure_file, legend_panel
 from placerec.evaluation.plots import plot_evaluation
@@ -15,12 +16,15 @@ __all__ = [
     "belief_strip",
     "confusion_panel",
     "coverage_panel",
+    "decision_page",
     "evaluate",
     "evaluate_files",
     "figure_file",
+    "format_decision",
     "format_evaluation",
     "heading",
     "html_page",
+    "inspect_decision",
     "legend_panel",
     "paragraph",
     "picture",

@@ -216,6 +216,6 @@ def _beliefs(stream: WordStream, places: tuple[str, ...], belief: Floats) -> Bel
         stream.places,
         stream.words,
         np.ones(len(stream), bool),
-        best_places(places, belief),
+        best_places(places, belief.argmax(axis=1)),
         belief,
     )

@@ -43,16 +43,16 @@ class Beliefs:
 
 
 def best_places(
-    places: Sequence[str], belief: NDArray[np.float64], unknown: NDArray[np.float64] | None = None
+    places: Sequence[str], best: NDArray[np.int64], unknown: NDArray[np.float64] | None = None
 ) -> tuple[str, ...]:
-    """What to write as `best` of n frames: the most probable place, the first of equals; UNKNOWN above 1/2.
+    """What to write as `best` of n frames: the place with the index `best` (n,), or UNKNOWN where that is above 1/2.
 
-    belief: (n, C); unknown: (n,), or None where it is not asked for.
+    unknown: (n,), or None where it is not asked for.
     """
-    best = [places[index] for index in np.argmax(belief, axis=1).tolist()]
+    names = [places[index] for index in best.tolist()]
     if unknown is None:
-        return tuple(best)
-    return tuple(UNKNOWN if new else place for place, new in zip(best, (unknown > 0.5).tolist(), strict=True))
+        return tuple(names)
+    return tuple(UNKNOWN if new else place for place, new in zip(names, (unknown > 0.5).tolist(), strict=True))
 
 
 def format_header(places: Iterable[str], *, unknown: bool = False) -> str:
@@ -83,14 +83,13 @@ def format_row(
 
 def write_beliefs(path: Path | str, beliefs: Beliefs) -> None:
     """Write one sequence's beliefs, gzipped if `path` ends in .gz; raises OutputError if that cannot be done."""
-    unknown = [None] * len(beliefs.frames) if beliefs.unknown is None else beliefs.unknown.tolist()
     lines = [format_header(beliefs.places, unknown=beliefs.unknown is not None)]
-    lines += [format_row(*row, new) for row, new in zip(belief_rows(beliefs), unknown, strict=True)]
+    lines += [format_row(*row) for row in belief_rows(beliefs)]
     write_text(Path(path), "\n".join(lines) + "\n")
 
 
-def belief_rows(beliefs: Beliefs) -> Iterator[tuple[str, float, str, str, bool, str, list[float]]]:
-    """What `format_row` takes, frame by frame, up to the beliefs in places."""
+def belief_rows(beliefs: Beliefs) -> Iterator[tuple[str, float, str, str, bool, str, list[float], float | None]]:
+    """What `format_row` takes, frame by frame."""
     return zip(
         beliefs.frames,
         beliefs.times.tolist(),
@@ -99,6 +98,7 @@ def belief_rows(beliefs: Beliefs) -> Iterator[tuple[str, float, str, str, bool, 
         beliefs.selected.tolist(),
         beliefs.best,
         beliefs.belief.tolist(),
+        [None] * len(beliefs.frames) if beliefs.unknown is None else beliefs.unknown.tolist(),
         strict=True,
     )
 

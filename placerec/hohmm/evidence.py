@@ -17,11 +17,12 @@ Floats = NDArray[np.float64]
 class Evidence:
     """An uninterrupted part of a stream, n frames with U selected words.
 
-    `selected` bool (n,); `log10_p` float64 (U, C) of the selected words in each place; `elapsed` float64 (U,): steps of
-    the transitions since the selected word before, 0 for the first.
+    `selected` bool (n,); `at` int64 (U,): where in the stream the selected words stand; `log10_p` float64 (U, C): of
+    them in each place; `elapsed` float64 (U,): steps of the transitions since the selected word before, the first 0.
     """
 
     selected: NDArray[np.bool_] = field(repr=False)
+    at: NDArray[np.int64] = field(repr=False)
     log10_p: Floats = field(repr=False)
     elapsed: Floats = field(repr=False)
 
@@ -55,7 +56,7 @@ def evidence_in(
         selected[known[part]] = select(words, selection)
         at = part[selected]
         log10_p = emissions.score([stream.words[i] for i in at.tolist()])
-        yield Evidence(selected, log10_p, _elapsed(at, stream.times, per))
+        yield Evidence(selected, at, log10_p, _elapsed(at, stream.times, per))
 
 
 def _elapsed(at: NDArray[np.int64], times: Floats, per: str) -> Floats:

@@ -18,6 +18,8 @@ Predict = Callable[[list[float]], list[float]]
 # Where every place can be reached from every place with more than this, a belief that is kept as it is (not as its
 # logarithm) never loses what matters later: what underflows is 300 decades below what comes from the other places.
 MIXING = 1e-15
+# Updates whose matrices are computed together.
+CHUNK = 1 << 12
 
 
 class Motion(Protocol):
@@ -127,6 +129,20 @@ def predict_logs(steps: Motion, logs: Floats, at: slice | Ints) -> Floats:
         highest = np.where(np.isfinite(reached.max(axis=0)), reached.max(axis=0), 0.0)
         predicted: Floats = np.log(np.exp(reached - highest).sum(axis=0)) + highest
     return predicted
+
+
+def predict_beliefs(belief: Floats, transition: Transition, elapsed: Floats) -> Floats:
+    """What is believed just before each of T words, float64 (T, C): uniform, then the predictions of `belief` (T, C).
+
+    `elapsed` float64 (T,): steps since the word before; the first is not used.
+    """
+    states = belief.T.copy()
+    states[:, 1:], states[:, :1] = belief[:-1].T, 1 / belief.shape[1]
+    steps = motion(transition, elapsed[1:])
+    for start in range(0, len(belief) - 1, CHUNK):
+        at = slice(start, min(start + CHUNK, len(belief) - 1))
+        steps.advance(states[:, 1:][:, at], at)
+    return states.T
 
 
 def total(states: Floats) -> Floats:

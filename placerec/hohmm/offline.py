@@ -1,12 +1,16 @@
 """What is believed of every frame of a sequence that is known to its end."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.hohmm import smoothing
+from placerec.hohmm import smoothing, unknown
 from placerec.hohmm.evidence import Evidence
 from placerec.hohmm.filter import filter_stream
+from placerec.hohmm.motion import predict_beliefs
 from placerec.hohmm.transitions import Transition
+from placerec.hohmm.unknown import UnknownModel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -36,6 +40,34 @@ def believe(
     if smooth or lag is not None:
         return hold(smoothing.smooth(log10_p, transition, elapsed), evidence), filtered.unexplained
     return hold(filtered.belief, evidence), filtered.unexplained
+
+
+def believe_unknown(
+    evidence: Evidence,
+    transition: Transition,
+    model: UnknownModel,
+    distances: Floats,
+    *,
+    smooth: bool = False,
+    lag: int | None = None,
+) -> Floats:
+    """The probability at every frame that the place is none of the known ones, float64 (n,).
+
+    `distances` (U,): of the selected words, nan where unknown. What counts, and what is held, is as in `believe`.
+    """
+    places = evidence.log10_p.shape[1]
+    ratios = unknown_ratios(evidence, transition, model, distances)
+    chain = replace(evidence, log10_p=unknown.chain_evidence(ratios, places))
+    belief, _ = believe(chain, unknown.CHAIN, smooth=smooth, lag=lag)
+    before, _ = unknown.prior(places)
+    return np.where(evidence.updates > 0, belief[:, 0], before)
+
+
+def unknown_ratios(evidence: Evidence, transition: Transition, model: UnknownModel, distances: Floats) -> Floats:
+    """What each selected word says of a new place, float64 (U,): `unknown.evidence` beside the filter of the places."""
+    log10_p, elapsed = evidence.log10_p, evidence.elapsed
+    predicted = predict_beliefs(filter_stream(log10_p, transition, elapsed).belief, transition, elapsed)
+    return unknown.evidence(model, log10_p, predicted, distances)
 
 
 def most_probable_path(evidence: Evidence, transition: Transition) -> Ints:

@@ -2,21 +2,24 @@
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import ModelError
-from placerec.hohmm.beliefs import Beliefs
+from placerec.hohmm import unknown as new_place
+from placerec.hohmm.beliefs import UNKNOWN, Beliefs, best_places
+from placerec.hohmm.calibration import Calibration
 from placerec.hohmm.emissions import Emissions, common_words
-from placerec.hohmm.evidence import evidence_in
-from placerec.hohmm.filter import filter_step
-from placerec.hohmm.motion import Predict, predictor
-from placerec.hohmm.offline import believe, most_probable_path
+from placerec.hohmm.evidence import Evidence, evidence_in
+from placerec.hohmm.filter import LN10
+from placerec.hohmm.offline import believe, believe_unknown, most_probable_path
+from placerec.hohmm.online import OnlineFilter
 from placerec.hohmm.transitions import Transition, fixed_transition
+from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
 from placerec.lm.union import unite_models
 from placerec.words import Selection, WordStream, selector
@@ -24,28 +27,41 @@ from placerec.words import Selection, WordStream, selector
 if TYPE_CHECKING:
     from placerec.vision import Dictionary
 
-# How many distinct times between updates have their transitions kept.
-PREDICTORS = 1024
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Belief:
-    """What is believed after one frame: `probability` float64 (C,) beside `places`, summing to 1."""
+    """What is believed after one frame: `probability` float64 (C,) beside `places`, summing to 1.
+
+    `unknown`: the probability that the place is none of them, None where nobody asked; the others hold if it is one.
+    """
 
     places: tuple[str, ...]
     probability: NDArray[np.float64]
     word: str
     selected: bool
+    unknown: float | None = None
 
     @property
     def best(self) -> str:
-        """The most probable place; the first in order where several are."""
+        """The most probable place, the first in order where several are; "unknown" if that is above 1/2."""
+        if self.unknown is not None and self.unknown > 0.5:
+            return UNKNOWN
         return self.places[int(np.argmax(self.probability))]
 
     def as_dict(self) -> dict[str, float]:
         """Place -> probability."""
         return dict(zip(self.places, self.probability.tolist(), strict=True))
+
+
+class _Decoded(NamedTuple):
+    """Of n frames: beliefs (n, C), the place of each (n,), what is unknown (n,) or empty; words nobody explains."""
+
+    belief: NDArray[np.float64]
+    best: NDArray[np.int64]
+    unknown: NDArray[np.float64]
+    unexplained: int
 
 
 class Recognizer:
@@ -54,8 +70,9 @@ class Recognizer:
     `models`: one BackoffModel per place, all of the same words. `selection` is that of their training. `transition`:
     how the place changes (default: the paper's). `dictionary` turns images into words, for `update` with images.
     `max_gap`: more seconds than this between two frames begin a new sequence. `emissions`: what gives the words'
-    probabilities, in place of the models. Raises ModelError if the models do not list the same words, or the
-    transitions are between more or fewer places.
+    probabilities, in place of the models. `calibration`: applied to the beliefs in places. `unknown`: what a place that
+    is none of them is weighed with; None: nobody asks. Raises ModelError if the models do not list the same words, or
+    the transitions are between more or fewer places.
     """
 
     def __init__(
@@ -67,6 +84,8 @@ class Recognizer:
         dictionary: "Dictionary | None" = None,
         max_gap: float | None = None,
         emissions: Emissions | None = None,
+        calibration: Calibration | None = None,
+        unknown: UnknownModel | None = None,
     ) -> None:
         if not models:
             raise ModelError("a recognizer needs the model of at least one place")
@@ -79,7 +98,10 @@ class Recognizer:
         self.max_gap = max_gap
         self._words = common_words(models)
         self.emissions = emissions or unite_models(list(models.values()))
-        self._predictors: dict[float, Predict] = {}
+        self.calibration = calibration
+        self.unknown = unknown
+        self._filter = OnlineFilter(self.transition, [1 / len(models)] * len(models))
+        self._chain = OnlineFilter(new_place.CHAIN, new_place.prior(len(models)))
         self.unexplained = 0
         self.reset()
 
@@ -88,7 +110,8 @@ class Recognizer:
 
     def reset(self) -> None:
         """Forget the sequence so far: uniform belief, empty history."""
-        self._log_belief = [-math.log(len(self.places))] * len(self.places)
+        self._filter.reset()
+        self._chain.reset()
         self._score = self.emissions.follow()
         self._keep = selector(self.selection)
         self._frame = 0
@@ -96,23 +119,33 @@ class Recognizer:
         # Frame and time of the last update; None before the first.
         self._updated: tuple[int, float | None] | None = None
 
-    def update(self, word_or_image: "str | NDArray[Any]", time: float | None = None) -> Belief:
+    def update(
+        self, word_or_image: "str | NDArray[Any]", time: float | None = None, distance: float | None = None
+    ) -> Belief:
         """The belief after one more frame: its word, or its image (h, w) grey 0..255 if there is a dictionary.
 
-        `time` in seconds: needed with a largest gap and with transitions per second. A word that the selection skips
-        leaves the belief as it is (readings A16). Raises ModelError for a word that the models do not list, for an
-        image without a dictionary, and for a time that is needed and missing, or goes back; nothing has changed then.
+        `time` in seconds: needed with a largest gap and with transitions per second. `distance` of a word, from the
+        descriptor to its unit: evidence for a place that is unknown; that of an image comes from the dictionary. A word
+        that the selection skips leaves the belief as it is (readings A16). Raises ModelError for a word that the models
+        do not list, for an image without a dictionary, and for a time that is needed and missing, or goes back; nothing
+        has changed then.
         """
-        word = word_or_image if isinstance(word_or_image, str) else self._see(word_or_image)
+        if isinstance(word_or_image, str):
+            word = word_or_image
+        else:
+            word, distance = self._see(word_or_image)
         if word not in self._words:
             raise ModelError(f"the word {word!r} is not in the models' vocabulary")
         self._pass(time, needed=self._needs_times)
         selected = self._keep(word)
         if selected:
-            if self._updated is not None:
-                self._log_belief = self._predictor(*self._updated)(self._log_belief)
-            self._log_belief, explained = filter_step(self._log_belief, self._score(word))
-            self.unexplained += not explained
+            steps = self._steps()
+            if steps is not None:
+                self._filter.predict(steps)
+            log10_p = self._score(word)
+            if self.unknown is not None:
+                self._weigh_unknown(self.unknown, log10_p, steps, distance)
+            self.unexplained += not self._filter.weigh(log10_p)
             self._updated = self._frame, self._time
         return self.belief(word, selected)
 
@@ -123,8 +156,11 @@ class Recognizer:
 
     def belief(self, word: str = "", selected: bool = False) -> Belief:
         """The belief as it stands."""
-        probability = np.array([math.exp(b) for b in self._log_belief])
-        return Belief(self.places, probability / probability.sum(), word, selected)
+        probability = self._probabilities()
+        if self.calibration is not None:
+            probability = self.calibration.apply(probability)
+        unknown = None if self.unknown is None else math.exp(self._chain.log_belief[0])
+        return Belief(self.places, probability, word, selected, unknown)
 
     def decode(
         self, stream: WordStream, *, smooth: bool = False, viterbi: bool = False, lag: int | None = None
@@ -135,25 +171,14 @@ class Recognizer:
         models do not list are skipped as `skip` does, and counted in a warning. Raises StreamError as `evidence_in`.
         """
         self._warn_of_strange_words(stream)
-        selected, beliefs, best, unexplained = [], [], [], 0
-        parts = evidence_in(
-            stream,
-            self.emissions,
-            self._words,
-            selection=self.selection,
-            per=self.transition.per,
-            max_gap=self.max_gap,
-        )
-        for evidence in parts:
-            belief, strange = believe(evidence, self.transition, smooth=smooth, lag=lag)
-            selected.append(evidence.selected)
-            beliefs.append(belief)
-            best.append(most_probable_path(evidence, self.transition) if viterbi else belief.argmax(axis=1))
-            unexplained += strange
-        if len(beliefs) > 1:
-            log.info("%s: gaps of more than %g s: %d", stream.name, self.max_gap, len(beliefs) - 1)
+        parts = list(self.evidence(stream))
+        decoded = [self._decoded(part, stream, smooth=smooth, viterbi=viterbi, lag=lag) for part in parts]
+        if len(parts) > 1:
+            log.info("%s: gaps of more than %g s: %d", stream.name, self.max_gap, len(parts) - 1)
+        unexplained = sum(part.unexplained for part in decoded)
         if unexplained:
             log.warning("%s: words that no place explains: %d left the prediction as it was", stream.name, unexplained)
+        unknown = None if self.unknown is None else np.concatenate([part.unknown for part in decoded])
         return Beliefs(
             stream.name,
             self.places,
@@ -161,10 +186,33 @@ class Recognizer:
             stream.times,
             stream.places,
             stream.words,
-            np.concatenate(selected),
-            tuple(self.places[i] for i in np.concatenate(best).tolist()),
-            np.concatenate(beliefs),
+            np.concatenate([part.selected for part in parts]),
+            best_places(self.places, np.concatenate([part.best for part in decoded]), unknown),
+            np.concatenate([part.belief for part in decoded]),
+            unknown,
         )
+
+    def evidence(self, stream: WordStream) -> Iterator[Evidence]:
+        """What a sequence says of the places, in parts that gaps end; words that the models do not list say nothing."""
+        return evidence_in(
+            stream,
+            self.emissions,
+            self._words,
+            selection=self.selection,
+            per=self.transition.per,
+            max_gap=self.max_gap,
+        )
+
+    def _decoded(self, part: Evidence, stream: WordStream, *, smooth: bool, viterbi: bool, lag: int | None) -> _Decoded:
+        belief, unexplained = believe(part, self.transition, smooth=smooth, lag=lag)
+        best = most_probable_path(part, self.transition) if viterbi else belief.argmax(axis=1)
+        if self.calibration is not None:
+            belief = self.calibration.apply(belief)
+        unknown = np.empty(0)
+        if self.unknown is not None:
+            far = stream.distances[part.at]
+            unknown = believe_unknown(part, self.transition, self.unknown, far, smooth=smooth, lag=lag)
+        return _Decoded(belief, best, unknown, unexplained)
 
     @property
     def _needs_times(self) -> bool:
@@ -184,24 +232,37 @@ class Recognizer:
             self._time = time
         self._frame += 1
 
-    def _predictor(self, frame: int, time: float | None) -> Predict:
-        """The prediction from the last update to now."""
-        steps = 1.0
+    def _steps(self) -> float | None:
+        """Steps of the transitions since the last update, None before the first."""
+        if self._updated is None:
+            return None
+        frame, time = self._updated
         if self.transition.per == "frame":
-            steps = self._frame - frame
-        elif self.transition.per == "second" and self._time is not None and time is not None:
-            steps = self._time - time
-        predict = self._predictors.get(steps)
-        if predict is None:
-            if len(self._predictors) == PREDICTORS:
-                self._predictors.clear()
-            predict = self._predictors[steps] = predictor(self.transition, steps)
-        return predict
+            return self._frame - frame
+        if self.transition.per == "second" and self._time is not None and time is not None:
+            return self._time - time
+        return 1.0
 
-    def _see(self, image: NDArray[Any]) -> str:
+    def _weigh_unknown(
+        self, model: UnknownModel, log10_p: Sequence[float], steps: float | None, distance: float | None
+    ) -> None:
+        """Take in a word as evidence for a place that is unknown; the filter is at its prediction."""
+        if steps is not None:
+            self._chain.predict(steps)
+        far = np.array([math.nan if distance is None else distance])
+        (ratio,) = new_place.evidence(model, np.array([log10_p]), self._probabilities()[None], far).tolist()
+        self._chain.weigh([ratio / LN10, 0.0])
+
+    def _probabilities(self) -> NDArray[np.float64]:
+        """The filter's own belief (C,)."""
+        probability = np.array([math.exp(b) for b in self._filter.log_belief])
+        normal: NDArray[np.float64] = probability / probability.sum()
+        return normal
+
+    def _see(self, image: NDArray[Any]) -> tuple[str, float]:
         if self.dictionary is None:
             raise ModelError("an image needs a dictionary to become a word; give the recognizer the words.npz")
-        return self.dictionary.see(image)
+        return self.dictionary.look(image)
 
     def _warn_of_strange_words(self, stream: WordStream) -> None:
         strange = [word for word in stream.words if word not in self._words]

@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.hohmm.filter import LN10, filter_logs
-from placerec.hohmm.motion import Motion, motion, predict_logs
+from placerec.hohmm.motion import CHUNK, Motion, motion, predict_logs
 from placerec.hohmm.transitions import Transition
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-# Updates whose matrices are computed together.
-CHUNK = 1 << 12
 
 
 def smooth(log10_p: Floats, transition: Transition, elapsed: Floats) -> Floats:

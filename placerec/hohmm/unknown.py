@@ -23,11 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.hohmm.distances import BINS_PER_OCTAVE, Histogram
+from placerec.hohmm.filter import LN10
+from placerec.hohmm.transitions import fixed_transition
 
 Floats = NDArray[np.float64]
 
-# Unknown and known are kept with the paper's p_e; a new place may begin wherever one of the known ones may.
-STAY = 0.99
+# Unknown and known are kept with the paper's p_e, in the steps of the places' transitions.
+CHAIN = fixed_transition(2, 0.99)
 # How much further out than a known place a new one lies, in octaves: 0.6 to 1 for GIST in rooms.
 OUTLYING = 1.0
 # Neighbouring units of a map are not free of each other, so that k of them fit less than k would.
@@ -122,62 +124,20 @@ def evidence(model: UnknownModel, log10_p: Floats, predicted: Floats, distances:
     return model.news * ratio
 
 
-def start(places: int) -> float:
-    """The log odds of `unknown` before anything is seen: it is one place more than the C known ones."""
-    return -math.log(places)
+def prior(places: int) -> tuple[float, float]:
+    """The probabilities of `unknown` and of known before anything is seen: it is one place beside the C known ones."""
+    return 1 / (places + 1), places / (places + 1)
 
 
-def update(log_odds: float, ratio: float, steps: float = 1.0) -> float:
-    """The log odds of `unknown` after a frame with evidence `ratio`, `steps` transitions after the frame before it.
+def chain_evidence(ratios: Floats, places: int) -> Floats:
+    """log10 p float64 (T, 2) of T frames in the states of the chain, unknown and known; `ratios` (T,): of `evidence`.
 
-    `steps` is what the transitions between places count (updates, frames or seconds); 0 for the first frame.
+    A filter that begins with even beliefs begins with `prior` by them: that is put into the first frame.
     """
-    if steps:
-        changed = 0.5 - 0.5 * (2 * STAY - 1) ** steps
-        unknown = probability(log_odds)
-        unknown = unknown * (1 - changed) + (1 - unknown) * changed
-        log_odds = math.log(unknown) - math.log1p(-unknown)
-    return log_odds + ratio
-
-
-def probability(log_odds: float) -> float:
-    """The probability whose log odds these are."""
-    return 0.5 + 0.5 * math.tanh(0.5 * log_odds)
-
-
-def filter_unknown(ratios: Floats, places: int, steps: Floats | None = None) -> Floats:
-    """The probability of `unknown` (T,) after each frame, given it and those before: what `update` gives one by one.
-
-    ratios: (T,) of `evidence`; steps: (T,) as in `update`, by default 1, and 0 for the first.
-    """
-    return np.array([probability(odds) for odds in _forward(ratios, places, _steps(ratios, steps))])
-
-
-def smooth_unknown(ratios: Floats, places: int, steps: Floats | None = None) -> Floats:
-    """The probability of `unknown` (T,) at each frame, given all frames: forward and backward."""
-    steps = _steps(ratios, steps)
-    smoothed = _forward(ratios, places, steps)
-    later = 0.0  # log of p(later frames | unknown) / p(later frames | known)
-    for t in range(len(ratios) - 1, 0, -1):
-        # The chain is the same in both directions, so that what comes later is passed on as the belief is.
-        later = update(later + float(ratios[t]), 0.0, float(steps[t]))
-        smoothed[t - 1] += later
-    return np.array([probability(odds) for odds in smoothed])
-
-
-def _forward(ratios: Floats, places: int, steps: Floats) -> list[float]:
-    found = []
-    log_odds = start(places)
-    for ratio, step in zip(ratios.tolist(), steps.tolist(), strict=True):
-        log_odds = update(log_odds, ratio, step)
-        found.append(log_odds)
+    found = np.zeros((len(ratios), 2))
+    found[:, 0] = ratios / LN10
+    found[:1, 0] -= math.log10(places)
     return found
-
-
-def _steps(ratios: Floats, steps: Floats | None) -> Floats:
-    if steps is not None:
-        return steps
-    return (np.arange(len(ratios)) > 0).astype(np.float64)
 
 
 def _word_evidence(vocabulary: int, log10_p: Floats, predicted: Floats) -> Floats:

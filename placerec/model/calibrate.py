@@ -16,6 +16,7 @@ from placerec.hohmm.unknown import measure_distances
 from placerec.model.decoding import PAPER, Decoding, describe_decoding
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.recognize import make_recognizer, token_streams
+from placerec.model.record import read_distances
 from placerec.model.train import MODEL_JSON, format_description
 from placerec.words import WordStream
 
@@ -85,10 +86,9 @@ def _columns(models: PlaceModels, labels: Sequence[str]) -> NDArray[np.int64]:
 
 def _measured(models: PlaceModels, streams: Sequence[WordStream]) -> dict[str, float] | None:
     """How the distances of these frames differ from those in training, for `unknown`; None where there are none."""
-    stored: Mapping[str, Mapping[str, int]] | None = models.description.get("distances")
-    if not stored:
+    histograms = read_distances(models.path / MODEL_JSON, models.description)
+    if not histograms:
         return None
-    histograms = [{int(b): count for b, count in stored.get(place, {}).items()} for place in models.models]
     truth = _columns(models, [label for stream in streams for label in stream.places])
     distances = np.concatenate([stream.distances for stream in streams])
     measured = measure_distances(distances[truth >= 0], truth[truth >= 0], histograms)

@@ -8,7 +8,9 @@ from pathlib import Path
 
 from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
-from placerec.hohmm import Beliefs, belief_rows, format_header, format_row
+from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, format_row
+from placerec.hohmm.beliefs import UNKNOWN
+from placerec.hohmm.explain import EXPLAINED, explain_stream
 from placerec.model.corpus import STREAM_SUFFIXES
 from placerec.model.decoder import Decoder
 from placerec.model.decoding import PAPER, Decoding
@@ -37,32 +39,53 @@ def decode(
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
     `sources`: token streams, or image sources (of `format`) if `words` (a words.npz) is given. Without `out` there must
-    be one sequence only. `make`: what gives the decoder, for the arguments of `make_recognizer`. Raises ModelError or
-    StreamError for what cannot be read or does not belong together.
+    be one sequence only; explanations are written there, as NAME.explain.jsonl. `make`: what gives the decoder, for
+    the arguments of `make_recognizer`. Raises ModelError or StreamError for what cannot be read or does not belong
+    together.
     """
-
-    def decoded() -> list[Beliefs]:
-        models = load_model(model)
-        if words is None:
-            recognizer = make(models, options=options, scorer=scorer)
-            streams = token_streams(sources, models)
-        else:
-            recognizer, streams = _image_streams(sources, Path(words), models, format, options, scorer, progress, make)
-        if out is None and len(streams) > 1:
-            raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
-        ahead = {"smooth": options.smooth, "viterbi": options.viterbi, "lag": options.lag}
-        return [recognizer.decode(stream, **(ahead if options.looks_ahead else {})) for stream in streams]
-
     if out is None:
-        return decoded()
+        if options.explain:
+            raise ModelError("explanations are files: name a folder for them with -o")
+        _, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress, make)
+        if len(streams) > 1:
+            raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
+        return [_decoded(recognizer, stream, options) for stream in streams]
     _spare_sources(sources, Path(out))
+    found = []
     with whole_folder(Path(out), OWNED) as folder:
-        found = decoded()
-        for beliefs in found:
+        models, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress, make)
+        for stream in streams:
+            beliefs = _decoded(recognizer, stream, options)
             suffix = "jsonl" if as_json else "tsv"
             write_text(folder / f"{beliefs.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
+            if options.explain and isinstance(recognizer, Recognizer):
+                lines = explain_stream(recognizer, models.models, stream)
+                text = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines)
+                write_text(folder / f"{beliefs.name}{EXPLAINED}", text)
+            found.append(beliefs)
     log.info("%s: %d sequences, %d frames", out, len(found), sum(len(beliefs.frames) for beliefs in found))
     return found
+
+
+def _opened(
+    sources: Sequence[Path | str],
+    model: Path | str,
+    words: Path | str | None,
+    format: str,
+    options: Decoding,
+    scorer: str,
+    progress: Progress | None,
+    make: Callable[..., Decoder],
+) -> tuple[PlaceModels, Decoder, list[WordStream]]:
+    models = load_model(model)
+    if words is not None:
+        return models, *_image_streams(sources, Path(words), models, format, options, scorer, progress, make)
+    return models, make(models, options=options, scorer=scorer), token_streams(sources, models)
+
+
+def _decoded(recognizer: Decoder, stream: WordStream, options: Decoding) -> Beliefs:
+    ahead = {"smooth": options.smooth, "viterbi": options.viterbi, "lag": options.lag}
+    return recognizer.decode(stream, **(ahead if options.looks_ahead else {}))
 
 
 def _image_streams(
@@ -96,55 +119,61 @@ def _spare_sources(sources: Sequence[Path | str], out: Path) -> None:
 
 def format_beliefs(beliefs: Beliefs, *, as_json: bool = False) -> str:
     """The text of a beliefs file: TSV with a header, or one JSON object a line."""
-    lines = [] if as_json else [format_header(beliefs.places)]
+    lines = [] if as_json else [format_header(beliefs.places, unknown=beliefs.unknown is not None)]
     lines += [_line(beliefs.places, *row, as_json=as_json) for row in belief_rows(beliefs)]
     return "".join(f"{line}\n" for line in lines)
 
 
 def decode_lines(recognizer: Decoder, lines: Iterable[str], *, as_json: bool = False) -> Iterator[str]:
-    """`placerec decode -`: an answer for each line `word` or `word TAB seconds`, as soon as it is read.
+    """`placerec decode -`: an answer for each line `word [TAB [seconds] [TAB distance]]`, as soon as it is read.
 
     The TSV header comes before the first line is read. A word that the models do not list holds the belief; the first
-    one and the number of them are logged. Raises StreamError for seconds that are no number, and for those that are
-    needed (`Recognizer.update`) and missing, or go back.
+    one and the number of them are logged. Raises StreamError for seconds or a distance that are no number, and for
+    seconds that are needed (`Recognizer.update`) and missing, or go back.
     """
     if not as_json:
-        yield format_header(recognizer.places)
+        yield format_header(recognizer.places, unknown=recognizer.unknown is not None)
     strange = 0
     for frame, line in enumerate(lines):
-        word, time = _word_and_seconds(line, frame)
+        word, time, distance = _fields(line, frame)
         known = word in recognizer
         if not known and not strange:
             log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
         strange += not known
         try:
-            belief = recognizer.update(word, time) if known else recognizer.skip(time)
+            belief = recognizer.update(word, time, distance) if known else recognizer.skip(time)
         except ModelError as error:
             raise StreamError(at("<stdin>", frame + 1, str(error))) from error
-        probability = belief.probability.tolist()
-        yield _line(
-            recognizer.places, str(frame), time, "", word, belief.selected, belief.best, probability, as_json=as_json
-        )
+        row = str(frame), time, "", word, belief.selected, belief.best, belief.probability.tolist(), belief.unknown
+        yield _line(recognizer.places, *row, as_json=as_json)
     if strange:
         log.warning("<stdin>: lines skipped because the models do not list their word: %d", strange)
     if recognizer.unexplained:
         log.warning("<stdin>: words that no place explains, which left the prediction: %d", recognizer.unexplained)
 
 
-def _word_and_seconds(line: str, frame: int) -> tuple[str, float]:
-    """The two fields of line `frame` (from 0), nan for no seconds."""
+def _fields(line: str, frame: int) -> tuple[str, float, float]:
+    """Word, seconds and distance of line `frame` (from 0), nan for what is not there."""
     if frame == 0:
         line = line.removeprefix("\ufeff")
-    word, _, seconds = line.rstrip("\r\n").partition("\t")
-    if not seconds.strip():
-        return word.strip(), math.nan
+    word, *rest = line.rstrip("\r\n").split("\t")
+    if len(rest) > 2:
+        raise StreamError(at("<stdin>", frame + 1, f"{len(rest) + 1} fields; word, seconds and distance are expected"))
+    seconds, distance = [*rest, "", ""][:2]
+    time = _number(seconds, frame, f"time {seconds!r} is not a number of seconds")
+    return word.strip(), time, _number(distance, frame, f"distance {distance!r} is not a number")
+
+
+def _number(text: str, frame: int, complaint: str) -> float:
+    if not text.strip():
+        return math.nan
     try:
-        time = float(seconds)
+        value = float(text)
     except ValueError:
-        time = math.nan
-    if not math.isfinite(time):
-        raise StreamError(at("<stdin>", frame + 1, f"time {seconds!r} is not a number of seconds"))
-    return word.strip(), time
+        value = math.nan
+    if not math.isfinite(value):
+        raise StreamError(at("<stdin>", frame + 1, complaint))
+    return value
 
 
 def _line(
@@ -156,11 +185,12 @@ def _line(
     selected: bool,
     best: str,
     belief: Sequence[float],
+    unknown: float | None,
     *,
     as_json: bool,
 ) -> str:
     if not as_json:
-        return format_row(frame, time, truth, word, selected, best, belief)
+        return format_row(frame, time, truth, word, selected, best, belief, unknown)
     return json.dumps(
         {
             "frame": frame,
@@ -170,6 +200,7 @@ def _line(
             "selected": selected,
             "best": best,
             "belief": dict(zip(places, belief, strict=True)),
+            **({} if unknown is None else {UNKNOWN: unknown}),
         },
         ensure_ascii=False,
     )

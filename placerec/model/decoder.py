@@ -14,6 +14,10 @@ class Decoder(Protocol):
         """The places, in the order of the beliefs."""
 
     @property
+    def unknown(self) -> object | None:
+        """None where nobody asks for the probability that the place is none of them."""
+
+    @property
     def unexplained(self) -> int:
         """How many words no place could explain."""
 
@@ -26,8 +30,8 @@ class Decoder(Protocol):
     def reset(self) -> None:
         """Forget the sequence so far."""
 
-    def update(self, word: str, /, time: float | None = None) -> Belief:
-        """The belief after one more frame and its word."""
+    def update(self, word: str, /, time: float | None = None, distance: float | None = None) -> Belief:
+        """The belief after one more frame, its word, and the distance to it."""
 
     def skip(self, time: float | None = None) -> Belief:
         """The belief after one more frame that has no word."""

@@ -21,8 +21,9 @@ class Decoding:
     of the frames since the last update), or the path of a matrix (`read_transitions`). `stay`: None is 0.99. `per`:
     what one step of the transitions is, an `update`, a `frame`, or a `second` of the stream's time; None is `update`.
     `max_gap`: more seconds than this between two frames begin a new sequence. Of `smooth` (all words count), `lag`
-    (words up to so many frames later count) and `viterbi` (`best` is the most probable path) one at most. Raises
-    ModelError for options that exclude each other.
+    (words up to so many frames later count) and `viterbi` (`best` is the most probable path) one at most. `calibrated`:
+    apply the calibration of the model. `unknown`: weigh that the place is none of the model's. `explain`: write down
+    what decided (`placerec.hohmm.explain`). Raises ModelError for options that exclude each other.
     """
 
     transition: str = "fixed"
@@ -32,6 +33,9 @@ class Decoding:
     smooth: bool = False
     viterbi: bool = False
     lag: int | None = None
+    calibrated: bool = False
+    unknown: bool = False
+    explain: bool = False
 
     def __post_init__(self) -> None:
         if self.transition == "learned" and (self.stay is not None or self.per is not None):
@@ -50,6 +54,8 @@ class Decoding:
             raise ModelError(f"lag {self.lag} is below 0")
         if self.smooth + self.viterbi + (self.lag is not None) > 1:
             raise ModelError("of smooth, viterbi and lag only one can be asked for")
+        if self.explain and self.looks_ahead:
+            raise ModelError("explain tells how the filter decides word by word: it takes none of smooth, viterbi, lag")
 
     @property
     def looks_ahead(self) -> bool:

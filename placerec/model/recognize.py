@@ -5,11 +5,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from placerec.errors import ModelError
-from placerec.hohmm import Recognizer, SeparateEmissions
+from placerec.hohmm import Emissions, Recognizer, SeparateEmissions
 from placerec.lm.external import kenlm_scorer
 from placerec.model.corpus import check_dictionary, read_streams, stream_files
 from placerec.model.decoding import PAPER, Decoding, transition_of
 from placerec.model.load import PlaceModels, load_model
+from placerec.model.trust import calibration_of, unknown_model_of
 from placerec.words import WordStream
 
 if TYPE_CHECKING:
@@ -25,9 +26,10 @@ def load_recognizer(
 ) -> Recognizer:
     """The recognizer of a MODEL/ folder.
 
-    `options`: its transitions, and what ends a sequence. `dictionary`: what turns images into words. `scorer`:
-    `native`, or `kenlm` (MissingExtraError where it is not installed). Raises ModelError if the dictionary is not the
-    one that made the training words, and as `transition_of` does.
+    `options`: its transitions, what ends a sequence, and what else is asked of it. `dictionary`: what turns images into
+    words. `scorer`: `native`, or `kenlm` (MissingExtraError where it is not installed). Raises ModelError if the
+    dictionary is not the one that made the training words, and as `transition_of`, `calibration_of` and
+    `unknown_model_of` do.
     """
     return make_recognizer(load_model(path), options=options, dictionary=dictionary, scorer=scorer)
 
@@ -38,14 +40,10 @@ def make_recognizer(
     options: Decoding = PAPER,
     dictionary: "Dictionary | None" = None,
     scorer: str = "native",
+    emissions: Emissions | None = None,
 ) -> Recognizer:
-    """The recognizer of a model that is loaded; see `load_recognizer`."""
-    trained_on = model.description["dictionary"]
-    if dictionary is not None and trained_on is not None and dictionary.fingerprint != trained_on:
-        raise ModelError(
-            f"{model.path}: was trained on the words of another dictionary than the one given; "
-            "give the words.npz of its training, or train it again"
-        )
+    """The recognizer of a model that is loaded; see `load_recognizer`. `emissions`: in place of the models' own."""
+    check_words(model, dictionary)
     if scorer not in ("native", "kenlm"):
         raise ModelError(f"scorer {scorer!r} is unknown; choose native or kenlm")
     return Recognizer(
@@ -54,8 +52,20 @@ def make_recognizer(
         transition=transition_of(model, options),
         dictionary=dictionary,
         max_gap=options.max_gap,
-        emissions=_kenlm(model) if scorer == "kenlm" else None,
+        emissions=_kenlm(model) if scorer == "kenlm" else emissions,
+        calibration=calibration_of(model, options) if options.calibrated else None,
+        unknown=unknown_model_of(model) if options.unknown else None,
     )
+
+
+def check_words(model: PlaceModels, dictionary: "Dictionary | None") -> None:
+    """Raise ModelError if `dictionary` is known not to be the one that made the words of `model`."""
+    trained_on = model.description["dictionary"]
+    if dictionary is not None and trained_on is not None and dictionary.fingerprint != trained_on:
+        raise ModelError(
+            f"{model.path}: was trained on the words of another dictionary than the one given; "
+            "give the words.npz of its training, or train it again"
+        )
 
 
 def token_streams(sources: Sequence[Path | str], model: PlaceModels) -> list[WordStream]:

@@ -146,12 +146,12 @@ def read_record(path: Path, description: Mapping[str, Any]) -> Record:
             LearnedSequence(str(item["name"]), {place: _count(n) for place, n in item["visits"].items()})
             for item in description["sequences"]
         )
-        places, steps, known = description["places"], description["transitions"], description["distances"]
-        if Record(learned).places != places or (steps is None) != (known is None):
+        places, steps = description["places"], description["transitions"]
+        distances = _distances(description)
+        if Record(learned).places != places or (steps is None) != (distances is None):
             raise ValueError(places)
         transitions = steps and np.array([[*map(_count, row)] for row in steps["counts"]], np.int64)
         triples = steps and _read_triples(steps["triples"], len(places))
-        distances = known and {place: {int(b): _count(n) for b, n in known[place].items()} for place in places}
         record = Record(learned, description["dictionary"], transitions, distances, triples)
         if transitions is not None and transitions.shape != (len(places), len(places)):
             raise ValueError(transitions.shape)
@@ -171,6 +171,20 @@ def _read_triples(listed: Any, C: int) -> Steps:
             raise ValueError(entry)
         triples[i, j, k] = count
     return triples
+
+
+def read_distances(path: Path, description: Mapping[str, Any]) -> list[Histogram] | None:
+    """The distances of each place in the content of the model.json `path`, None if it has none; ModelError as above."""
+    try:
+        distances = _distances(description)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ModelError(f"{path}: 'distances' holds no numbers of frames; train the model again") from error
+    return None if distances is None else [distances[place] for place in description["places"]]
+
+
+def _distances(description: Mapping[str, Any]) -> dict[str, Histogram] | None:
+    known = description["distances"]
+    return known and {place: {int(b): _count(n) for b, n in known[place].items()} for place in description["places"]}
 
 
 def _count(value: Any) -> int:

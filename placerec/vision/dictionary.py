@@ -169,8 +169,12 @@ class Dictionary:
 
     def see(self, image: Gray) -> str:
         """The word of one grey image (h, w) of 0..255; VisionError for an image that cannot be used."""
-        units, _ = self.words(descriptor(image, self.spec)[None])
-        return self.vocabulary[int(units[0])]
+        return self.look(image)[0]
+
+    def look(self, image: Gray) -> tuple[str, float]:
+        """The word of one grey image, and how far from it the image lies (see `words`); raises as `see` does."""
+        units, distances = self.words(descriptor(image, self.spec)[None])
+        return self.vocabulary[int(units[0])], float(distances[0])
 
     def save(self, path: Path | str) -> None:
         """Write words.npz: arrays and a JSON string `meta`, no pickle; the same dictionary gives the same bytes."""

@@ -1,5 +1,7 @@
 """Accumulation in bins and votes, by hand and against the definitions."""
 
+import math
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -60,24 +62,22 @@ THREE = lesson_of([[[0, 1, 2, 2]], [[1, 2]], [[2]]], words=4)
 
 
 def test_what_words_vote() -> None:
-    rare, common = np.log(3), np.log(3 / 2)
-    expected = [[rare, 0, 0], [common, common, 0], [0, 0, 0], [0, 0, 0]]
+    rare, common = math.log(3), math.log(3 / 2)
+    expected = [[rare, 0.0, 0.0], [common, common, 0.0], [0.0] * 3, [0.0] * 3]
     np.testing.assert_allclose(filliat2008.word_votes(THREE), expected, rtol=1e-15)
 
 
 def test_votes_are_counted_until_one_place_is_clear() -> None:
     rare, common = np.log(3), np.log(3 / 2)
     found = followed(filliat2008.fit(THREE, quality=0.5), [2, 1, 1, 0, 1, 0, 3])
-    first = rare + 2 * common
-    share = [first / (first + 2 * common), 2 * common / (first + 2 * common), 0]
     # Nobody voted; two are even; p0 is clear; the next votes do not count until p0 is clear again.
-    second = rare + common
-    again = [second / (second + common), common / (second + common), 0]
-    expected = [[1 / 3] * 3, [0.5, 0.5, 0], [0.5, 0.5, 0], share, share, again, again]
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    votes = np.array([[1, 1, 1], [1, 1, 0], [1, 1, 0], *[[rare + 2 * common, 2 * common, 0]] * 2])
+    votes = np.concatenate([votes, [[rare + common, common, 0]] * 2])
+    np.testing.assert_allclose(found, votes / votes.sum(axis=1, keepdims=True), rtol=1e-12)
 
 
 def test_a_decision_is_made_after_so_many_words_at_the_latest() -> None:
     found = followed(filliat2008.fit(THREE, most=2), [1, 1, 0, 1, 1])
-    expected = [[0.5, 0.5, 0], [0.5, 0.5, 0], [1, 0, 0], [1, 0, 0], [0.5, 0.5, 0]]
+    even, p0 = [0.5, 0.5, 0.0], [1.0, 0.0, 0.0]
+    expected = [even, even, p0, p0, even]
     np.testing.assert_allclose(found, expected, rtol=1e-12)

@@ -142,8 +142,8 @@ def test_the_column_unknown_is_no_place_and_stands_beside_the_sum() -> None:
 def test_unknown_is_decided_above_a_half_and_where_the_column_is() -> None:
     belief = np.array([[0.25, 0.75], [0.5, 0.5], [0.9, 0.1]])
     places = ("kitchen", "office")
-    assert best_places(places, belief) == ("office", "kitchen", "kitchen")
-    assert best_places(places, belief, np.array([0.5, 0.51, 0.0])) == ("office", "unknown", "kitchen")
+    assert best_places(places, belief.argmax(axis=1)) == ("office", "kitchen", "kitchen")
+    assert best_places(places, belief.argmax(axis=1), np.array([0.5, 0.51, 0.0])) == ("office", "unknown", "kitchen")
     decided = ROW.replace("\toffice\t", "\tunknown\t")
     assert parse_beliefs(f"{HEADER}\tunknown\n{decided}\t0.9\n", name="s", source="x").best == ("unknown",)
     with pytest.raises(EvaluationError, match="best is 'unknown', which is no place of the header"):

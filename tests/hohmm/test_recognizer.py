@@ -2,6 +2,7 @@
 
 import logging
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,16 @@ from hypothesis import strategies as st
 
 from placerec import reference
 from placerec.errors import ModelError, StreamError
-from placerec.hohmm import Recognizer, SeparateEmissions, Transition, fixed_transition, learned_transition, recognizer
+from placerec.hohmm import (
+    Calibration,
+    Recognizer,
+    SeparateEmissions,
+    Transition,
+    fixed_transition,
+    learned_transition,
+    online,
+)
+from placerec.hohmm.unknown import DistanceModel, UnknownModel
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
 from placerec.words import Selection, WordStream
 
@@ -140,6 +150,68 @@ def test_online_is_batch_for_all_options(
         assert belief.selected == batch.selected[i]
 
 
+FAR = Calibration(2.5, 1, 0.0, 0.0)
+
+
+def novelty(places: int) -> UnknownModel:
+    return UnknownModel(len(WORDS), 0.5, DistanceModel(np.linspace(0, 1, places), 0.3))
+
+
+@given(situations(), st.data())
+def test_online_is_batch_for_what_is_asked_beside_the_places(
+    situation: tuple[dict[str, BackoffModel], Selection, Transition, float | None, WordStream], data: st.DataObject
+) -> None:
+    models, selection, transition, gap, stream = situation
+    n = len(stream)
+    far = data.draw(st.lists(st.sampled_from([math.nan, 0.0, 0.5, 1.5, 9.0]), min_size=n, max_size=n))
+    stream = replace(stream, distances=np.array(far, float))
+    found = Recognizer(
+        models, selection=selection, transition=transition, max_gap=gap, calibration=FAR, unknown=novelty(len(models))
+    )
+    plain = Recognizer(models, selection=selection, transition=transition, max_gap=gap).decode(stream)
+    batch = found.decode(stream)
+    assert batch.belief == pytest.approx(FAR.apply(plain.belief), abs=1e-12)
+    assert batch.unknown is not None
+    for i, (word, time) in enumerate(zip(stream.words, stream.times.tolist(), strict=True)):
+        belief = found.update(word, time, far[i]) if word in found else found.skip(time)
+        assert belief.probability == pytest.approx(batch.belief[i], abs=1e-10)
+        assert belief.unknown == pytest.approx(batch.unknown[i], abs=1e-10)
+    # Later words change nothing.
+    cut = timed(list(stream.words[: n // 2]), stream.times[: n // 2].tolist())
+    earlier = found.decode(replace(cut, distances=stream.distances[: n // 2]))
+    assert earlier.unknown is not None
+    assert np.array_equal(earlier.unknown, batch.unknown[: n // 2])
+
+
+def test_what_is_unknown_is_held_smoothed_lagged_and_begins_anew() -> None:
+    models = models_of([[["a", "b"]], [["c"]]], 2)
+    found = Recognizer(models, selection=Selection("unique"), max_gap=10, unknown=novelty(2))
+    bare = timed(["zebra", "a", "a", "c", "a", "zebra", "a"], [0, 1, 2, 3, 4, 60, 61])
+    stream = replace(bare, distances=np.array([9, 9, 9, 9, 0.1, 0.1, 9]))
+    filtered, smoothed = found.decode(stream).unknown, found.decode(stream, smooth=True).unknown
+    assert filtered is not None
+    assert smoothed is not None
+    assert filtered[[0, 5]] == pytest.approx(1 / 3)
+    assert filtered[1] == filtered[2] > 1 / 3
+    # Alone after the gap: what one frame says is its evidence and nothing else.
+    assert smoothed[[0, 5]] == pytest.approx(1 / 3)
+    assert smoothed[6] == pytest.approx(filtered[6])
+    assert smoothed[4] == pytest.approx(filtered[4])
+    # A near frame comes after frame 3, and a far one after frame 1.
+    assert smoothed[3] < filtered[3]
+    assert smoothed[1] > filtered[1]
+    assert found.decode(stream, lag=0).unknown == pytest.approx(filtered)
+    assert found.decode(stream, lag=9).unknown == pytest.approx(smoothed)
+    path = found.decode(stream, viterbi=True)
+    assert path.unknown is not None
+    assert np.array_equal(path.unknown, filtered)
+    assert [best == "unknown" for best in path.best] == (filtered > 0.5).tolist()
+    assert "unknown" in path.best
+    found.reset()
+    found.update("a", 0, 9.0)
+    assert found.update("c", 1, 9.0).best == "unknown"
+
+
 @settings(max_examples=25)
 @given(situations(), st.integers(0, 40))
 def test_lags_go_from_the_filter_to_smoothing(
@@ -266,8 +338,8 @@ def test_scorers_of_their_own_give_the_same() -> None:
 
 
 def test_memory_does_not_grow_with_the_stream(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recognizer, "PREDICTORS", 5)
+    monkeypatch.setattr(online, "PREDICTORS", 5)
     found = Recognizer(models_of([[["a", "b"]], [["c"]]], 3), transition=fixed_transition(2, per="second"))
     for i in range(40):
         found.update(WORDS[i % 4], i**2 / 7)
-        assert len(found._predictors) <= 5
+        assert len(found._filter._predictors) <= 5

@@ -8,19 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from placerec.hohmm.filter import Floats, filter_stream
+from placerec.hohmm.smoothing import smooth
 from placerec.hohmm.unknown import (
-    STAY,
+    CHAIN,
     DistanceModel,
     UnknownModel,
     WordRuns,
+    chain_evidence,
     evidence,
-    filter_unknown,
     measure_distances,
-    probability,
-    smooth_unknown,
-    start,
+    prior,
     unknown_model,
-    update,
     word_runs,
 )
 
@@ -108,37 +107,24 @@ def test_held_out_frames_tell_how_far_out_new_ones_lie() -> None:
     assert measure_distances(distances, places, [{}, {}]) is None
 
 
+def unknown(ratios: list[float], places: int, steps: Floats, *, smoothed: bool = False) -> Floats:
+    """The probability of the chain's first state."""
+    log10_p = chain_evidence(np.array(ratios), places)
+    found: Floats = (smooth(log10_p, CHAIN, steps) if smoothed else filter_stream(log10_p, CHAIN, steps).belief)[:, 0]
+    return found
+
+
 def test_one_place_more_before_anything_is_seen() -> None:
-    assert probability(start(3)) == pytest.approx(1 / 4)
+    assert prior(3) == (1 / 4, 3 / 4)
     # Evidence that says nothing leaves it on the way to a half, by 1 - p_e a step.
-    assert filter_unknown(np.zeros(2), 3) == pytest.approx([0.25, 0.25 * STAY + 0.75 * (1 - STAY)])
-
-
-def test_frames_that_pass_are_transitions_that_pass() -> None:
-    once = update(update(update(-1.0, 0.0), 0.0), 0.7)
-    assert update(-1.0, 0.7, 3.0) == pytest.approx(once, abs=1e-12)
-    assert update(-1.0, 0.7, 0.0) == pytest.approx(-0.3)
-
-
-@given(ratio_lists, st.integers(1, 5))
-def test_one_by_one_as_in_one_go_and_blind_to_what_comes(ratios: list[float], places: int) -> None:
-    found = filter_unknown(np.array(ratios), places)
-    log_odds = start(places)
-    for t, ratio in enumerate(ratios):
-        log_odds = update(log_odds, ratio, 1.0 if t else 0.0)
-        assert probability(log_odds) == found[t]
-    assert filter_unknown(np.array(ratios[:3]), places).tolist() == found[:3].tolist()
-    assert ((found > 0) & (found < 1)).all()
+    assert unknown([0.0, 0.0], 3, np.ones(2)) == pytest.approx([0.25, 0.25 * 0.99 + 0.75 * 0.01])
 
 
 @given(ratio_lists, st.integers(1, 4), st.lists(st.integers(0, 4), min_size=7, max_size=7))
 def test_filter_and_smoother_equal_enumeration(ratios: list[float], places: int, gaps: list[int]) -> None:
     steps = np.array([0.0, *gaps[: len(ratios) - 1]])
-    filtered, smoothed = (
-        filter_unknown(np.array(ratios), places, steps),
-        smooth_unknown(np.array(ratios), places, steps),
-    )
-    chain = np.array([[STAY, 1 - STAY], [1 - STAY, STAY]])
+    filtered, smoothed = unknown(ratios, places, steps), unknown(ratios, places, steps, smoothed=True)
+    chain = np.array([[0.99, 0.01], [0.01, 0.99]])
     for seen, found in ((None, smoothed), (len(ratios) - 1, filtered)):
         weights = np.zeros((len(ratios), 2))
         for path in product((0, 1), repeat=len(ratios)):

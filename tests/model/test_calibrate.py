@@ -2,6 +2,7 @@
 
 import json
 import logging
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -122,3 +123,52 @@ def test_no_labelled_frame_is_an_error(world: Path) -> None:
     with pytest.raises(StreamError, match="no such file"):
         calibrate(world / "model", [world / "run9.tsv"])
     assert described(world / "model").get("calibration") is None
+
+
+def test_decode_applies_it(world: Path, caplog: pytest.LogCaptureFixture) -> None:
+    model, run = world / "model", [world / "tokens/run5.tsv"]
+    with pytest.raises(ModelError, match=r"model: is not calibrated; run `placerec calibrate .*model TOKENS\.\.\.` on"):
+        decode(run, model, options=Decoding(calibrated=True))
+    for options in (Decoding(), Decoding(smooth=True), Decoding(lag=3), Decoding(transition="learned")):
+        found = calibrate(model, [world / "tokens/run3.tsv"], options=options)
+        caplog.clear()
+        for asked in (options, replace(options, viterbi=not options.looks_ahead)):
+            (plain,), (applied,) = (
+                decode(run, model, options=replace(asked, calibrated=calibrated)) for calibrated in (False, True)
+            )
+            assert np.array_equal(applied.belief, found.apply(plain.belief))
+            assert applied.best == plain.best
+        assert caplog.messages == []
+    # The last one was for learned transitions.
+    decode(run, model, options=Decoding(stay=0.9, calibrated=True))
+    assert caplog.messages == [
+        f'{model}: was calibrated for other options (transition "learned", stay null, per "frame"); '
+        "calibrate with those of now"
+    ]
+
+
+def test_a_file_of_transitions_is_known_by_its_numbers(world: Path, caplog: pytest.LogCaptureFixture) -> None:
+    steps = world / "steps.tsv"
+    steps.write_text("hall\tkitchen\toffice\n" + "0.8\t0.1\t0.1\n0.1\t0.8\t0.1\n0.1\t0.1\t0.8\n")
+    calibrate(world / "model", [world / "tokens/run3.tsv"], options=Decoding(transition=str(steps)))
+    steps.rename(world / "moved.tsv")
+    asked = Decoding(transition=str(world / "moved.tsv"), calibrated=True)
+    decode([world / "tokens/run5.tsv"], world / "model", options=asked)
+    assert caplog.messages == []
+    (world / "moved.tsv").write_text((world / "moved.tsv").read_text().replace("0.8\t0.1\t0.1", "0.7\t0.2\t0.1"))
+    decode([world / "tokens/run5.tsv"], world / "model", options=asked)
+    assert "was calibrated for other options (transition [[0.8, 0.1, 0.1], " in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("kept", "message"),
+    [
+        (7, "model.json: 'calibration' is none; run `placerec calibrate` again"),
+        ({}, "model.json: the calibration lacks or garbles 'temperature'; run `placerec calibrate` again"),
+    ],
+)
+def test_a_calibration_that_cannot_be_used_is_named(world: Path, kept: object, message: str) -> None:
+    path = world / "model/model.json"
+    path.write_text(json.dumps(described(world / "model") | {"calibration": kept}))
+    with pytest.raises(ModelError, match=re.escape(message)):
+        decode([world / "tokens/run5.tsv"], world / "model", options=Decoding(calibrated=True))

@@ -1,0 +1,170 @@
+"""Why the filter believes what it believes: for each selected word what every place's model says of it, and which words
+of the last moments speak for the best place and which against it.
+
+What a word contributed is counted in the odds between the best place and the runner-up, to first order: how the odds of
+now follow its probabilities. With transitions that never change the place that is its likelihood ratio. Else it is the
+sum over places c of log10 p(word | c) times
+
+    P(c then | best now) - P(c then | runner-up now)
+
+which the transitions make smaller step by step: words fade as the filter forgets them.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.hohmm import unknown
+from placerec.hohmm.evidence import Evidence
+from placerec.hohmm.filter import filter_stream
+from placerec.hohmm.motion import CHUNK, motion, predict_beliefs
+from placerec.hohmm.offline import unknown_ratios
+from placerec.hohmm.recognizer import Recognizer
+from placerec.hohmm.transitions import Transition
+from placerec.lm import BackoffModel
+from placerec.lm.inspection import explain as explain_word
+from placerec.words import WordStream
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+# The end of the names of files with a decision a line.
+EXPLAINED = ".explain.jsonl"
+# How many selected words are asked for their contribution, and how many of them are named on either side.
+WINDOW, NAMED = 20, 3
+# What moved the odds by less, in decimal logarithms, is no argument.
+LEAST = 0.01
+# log10 p of a word that a place rules out: what SRILM writes for a probability of 0.
+NEVER = -99.0
+_OF_PLACE, _OF_UNKNOWN = ("log10_p", "before", "after"), ("log10_ratio", "before", "after")
+
+
+def explain_stream(
+    recognizer: Recognizer, models: Mapping[str, BackoffModel], stream: WordStream
+) -> Iterator[dict[str, Any]]:
+    """For each selected frame of a sequence a decision, as plain data (docs/files.md); `models` of the places in order.
+
+    The beliefs are the filter's own, before any calibration.
+    """
+    answer = _answers(models)
+    longest = max(model.order for model in models.values()) - 1
+    for part in recognizer.evidence(stream):
+        before, after = _beliefs(part.log10_p, recognizer.transition, part.elapsed)
+        order = np.argsort(-after, axis=1, kind="stable")
+        contributed = contributions(part, recognizer.transition, before, after, order[:, :2])
+        news = _news(recognizer, part, stream)
+        words = [stream.words[i] for i in part.at.tolist()]
+        numbers = np.stack([part.log10_p, before, after], axis=2)
+        for t, i in enumerate(part.at.tolist()):
+            history = words[max(0, t - longest) : t]
+            best, *others = [recognizer.places[column] for column in order[t].tolist()]
+            recent = [(stream.frames[part.at[t - k]], words[t - k]) for k in range(min(WINDOW, t + 1))]
+            said = zip(recognizer.places, numbers[t].tolist(), strict=True)
+            yield {
+                "frame": stream.frames[i],
+                "time": None if math.isnan(stream.times[i]) else float(stream.times[i]),
+                "place": stream.places[i] or None,
+                "word": words[t],
+                "history": history,
+                "best_before": recognizer.places[int(before[t].argmax())],
+                "best": best,
+                "rival": others[0] if others else None,
+                "places": {place: _named(_OF_PLACE, row) | answer(place, (*history, words[t])) for place, row in said},
+                **_arguments(recent, contributed[t].tolist()),
+                **({} if news is None else {"unknown": _named(_OF_UNKNOWN, news[t].tolist())}),
+            }
+
+
+def contributions(part: Evidence, transition: Transition, before: Floats, after: Floats, pair: Ints) -> Floats:
+    """How far each of the last WINDOW words moved the odds between two places: log10, float64 (U, WINDOW).
+
+    `before`, `after` (U, C): the filter's beliefs; `pair` (U, 2): the places. Column k: of the word k selected frames
+    ago; 0 where there is none. For one place alone all are 0.
+    """
+    U, C = after.shape
+    found = np.zeros((U, WINDOW))
+    if C < 2:
+        return found
+    evidence = np.maximum(part.log10_p, NEVER)
+    # A word that no place explains left the prediction as it was.
+    evidence[np.isneginf(part.log10_p).all(axis=1)] = 0.0
+    steps = motion(transition, part.elapsed[1:])
+    for start in range(0, U, CHUNK):
+        stop, first = min(start + CHUNK, U), max(0, start - WINDOW)
+        matrices = np.moveaxis(steps.matrices(slice(first, stop - 1)), 2, 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # P(place then | place one word later, words up to then).
+            earlier = after[first : stop - 1, :, None] * matrices / before[first + 1 : stop, None, :]
+        earlier = np.nan_to_num(earlier, posinf=0.0)
+        weight = np.eye(C)[pair[start:stop, 0]] - np.eye(C)[pair[start:stop, 1]]
+        now = np.arange(start, stop)
+        for k in range(WINDOW):
+            if k:
+                weight, now = weight[now >= k], now[now >= k]
+                weight = np.einsum("tij,tj->ti", earlier[now - k - first], weight)
+            found[now, k] = (weight * evidence[now - k]).sum(axis=1)
+    return found
+
+
+def _beliefs(log10_p: Floats, transition: Transition, elapsed: Floats) -> tuple[Floats, Floats]:
+    after = filter_stream(log10_p, transition, elapsed).belief
+    return predict_beliefs(after, transition, elapsed), after
+
+
+def _news(recognizer: Recognizer, part: Evidence, stream: WordStream) -> Floats | None:
+    """Per selected word what it says of a new place, log10, and the probability of that before and after: (U, 3)."""
+    if recognizer.unknown is None:
+        return None
+    ratios = unknown_ratios(part, recognizer.transition, recognizer.unknown, stream.distances[part.at])
+    places = len(recognizer.places)
+    before, after = _beliefs(unknown.chain_evidence(ratios, places), unknown.CHAIN, part.elapsed)
+    before[:1, 0], _ = unknown.prior(places)
+    return np.stack([ratios / math.log(10), before[:, 0], after[:, 0]], axis=1)
+
+
+def _answers(models: Mapping[str, BackoffModel]) -> Callable[[str, tuple[str, ...]], dict[str, Any]]:
+    """A function that tells for a place and words which order answered for the last one, and the backoffs paid."""
+
+    @cache
+    def answer(place: str, words: tuple[str, ...]) -> dict[str, Any]:
+        *shortened, found = explain_word(models[place], words)["steps"]
+        paid = [step["log10_backoff"] for step in shortened]
+        return {"order": len(found["ngram"].split(" ")), "backoffs": [None if w is None else _short(w) for w in paid]}
+
+    return answer
+
+
+def _arguments(recent: Sequence[tuple[str, str]], contributed: Sequence[float]) -> dict[str, list[dict[str, Any]]]:
+    """The words that argued most `for` the best place, and most `against` it, the strongest first.
+
+    `recent`: frame and word, the latest first; a word that comes several times argues once, with the sum.
+    """
+    sums: dict[str, float] = {}
+    heard: dict[str, list[tuple[int, str]]] = {}
+    for ago, ((frame, word), moved) in enumerate(zip(recent, contributed, strict=False)):
+        sums[word] = sums.get(word, 0.0) + moved
+        heard.setdefault(word, []).insert(0, (ago, frame))
+    named: list[dict[str, Any]] = [
+        {
+            "word": word,
+            "frames": [frame for _, frame in heard[word]],
+            "ago": [ago for ago, _ in heard[word]],
+            "log10_odds": _short(sums[word]),
+        }
+        for word in sorted(sums, key=lambda word: -sums[word])
+    ]
+    supporting = [one for one in named if sums[one["word"]] > LEAST]
+    opposing = [one for one in reversed(named) if sums[one["word"]] < -LEAST]
+    return {"for": supporting[:NAMED], "against": opposing[:NAMED]}
+
+
+def _named(names: Sequence[str], values: Sequence[float]) -> dict[str, float | None]:
+    return dict(zip(names, map(_short, values), strict=True))
+
+
+def _short(value: float) -> float | None:
+    """Six significant digits: a file to read; None for what is not finite."""
+    return float(f"{value:.6g}") if math.isfinite(value) else None
