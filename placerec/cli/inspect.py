@@ -9,9 +9,8 @@ from click.core import ParameterSource
 from placerec.cli.options import PATH, json_option, output_option, talk_options
 
 EXAMPLES = """\b
-Examples:
-  placerec inspect model/kitchen.arpa "w07 w08"
-  placerec inspect beliefs/run3.explain.jsonl 153 -o decision.html
+Example: placerec inspect model/kitchen.arpa "w07 w08"
+         placerec inspect beliefs/run3.explain.jsonl 153 -o decision.html
 """
 
 
