@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
-from placerec.evaluation.compare import SIZE, Comparison, MethodScore, compare, format_methods, format_pairs, judge
+from placerec.evaluation.compare import SIZE, compare
 from placerec.evaluation.compare_plot import plot_comparison
+from placerec.evaluation.comparison import Comparison, MethodScore, format_methods, format_pairs, judge
 from placerec.evaluation.contest import ALL, Run
 from placerec.evaluation.material import Front
 from placerec.files import write_text

@@ -50,8 +50,9 @@ def compare(
     TRAIN and SEQUENCE are labelled sequences of images, or folders of them. Each method learns from TRAIN; accuracy
     with its interval, cost per frame, and for every two methods whether their difference holds.
     """
-    from placerec.evaluation.compare import check_methods, format_comparison
+    from placerec.evaluation.compare import check_methods
     from placerec.evaluation.compare import compare as run
+    from placerec.evaluation.comparison import format_comparison
 
     with usage("--methods"):
         chosen = check_methods(None if methods is None else methods.split(","))

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.evaluation.comparison import Comparison, MethodScore
+from placerec.evaluation.contest import POINT_METHODS
 from placerec.evaluation.panels import figure_file, place_colours
 from placerec.evaluation.summary import percent, shorten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from placerec.evaluation.compare import Comparison, MethodScore
 
 # Inches.
 _WIDTH, _LEAST_HEIGHT = 10.0, 5.2
@@ -22,7 +22,7 @@ _LABEL, _LEAST = 0.19, 0.1
 _KINDS = ("words", "words, two dictionaries", "descriptors")
 
 
-def plot_comparison(found: "Comparison", path: Path | str) -> None:
+def plot_comparison(found: Comparison, path: Path | str) -> None:
     """Draw every method but `majority`, which is a line; PNG, SVG or PDF by suffix. Raises as `figure_file` does."""
     scores = sorted((s for s in found.scores if s.method != "majority"), key=lambda s: (s.accuracy, s.method))
     height = max(_LEAST_HEIGHT, 1.6 + _LABEL * len(scores))
@@ -46,7 +46,7 @@ def plot_comparison(found: "Comparison", path: Path | str) -> None:
         figure.text(0.08, 0.12 / height, _caption(found), fontsize=7.5, color="0.3", va="bottom", linespacing=1.4)
 
 
-def _points(axes: "Axes", scores: "list[MethodScore]") -> None:
+def _points(axes: "Axes", scores: list[MethodScore]) -> None:
     colours = place_colours(_KINDS)
     for kind, colour in zip(_KINDS, map(tuple, colours.tolist()), strict=True):
         its = [s for s in scores if _kind(s) == kind]
@@ -79,7 +79,7 @@ def _points(axes: "Axes", scores: "list[MethodScore]") -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1.36, 1.02), ncols=3, fontsize=7.5, frameon=False)
 
 
-def _limits(axes: "Axes", found: "Comparison", scores: "list[MethodScore]") -> None:
+def _limits(axes: "Axes", found: Comparison, scores: list[MethodScore]) -> None:
     """Room for all intervals and the line, and a tenth of the costs' range on either side."""
     low = min([found.majority, *(s.accuracy_low for s in scores)])
     high = max([found.majority, *(s.accuracy_high for s in scores)])
@@ -89,7 +89,7 @@ def _limits(axes: "Axes", found: "Comparison", scores: "list[MethodScore]") -> N
     axes.set_xlim(10 ** float(costs.min() - margin), 10 ** float(costs.max() + margin))
 
 
-def _labels(axes: "Axes", scores: "list[MethodScore]", inches: float) -> None:
+def _labels(axes: "Axes", scores: list[MethodScore], inches: float) -> None:
     """Names in a column on the right, in the order of accuracy and apart from each other, a thin line to each point."""
     low, high = axes.get_ylim()
     wanted = (np.array([s.accuracy for s in scores]) - low) / (high - low)
@@ -134,16 +134,13 @@ def spread(wanted: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
     return moved
 
 
-def _kind(score: "MethodScore") -> str:
+def _kind(score: MethodScore) -> str:
     if score.consulted is not None:
         return _KINDS[1]
-    return _KINDS[2] if score.method in _ON_POINTS else _KINDS[0]
+    return _KINDS[2] if score.method in POINT_METHODS else _KINDS[0]
 
 
-_ON_POINTS = ("torralba2003", "ullah2008", "ullah2008-hmm", "knn")
-
-
-def _caption(found: "Comparison") -> str:
+def _caption(found: Comparison) -> str:
     number, what = found.drawn
     over = f"over {number} test sequences" if what == "sequences" else f"over the {number} visits of one sequence"
     lines = [

@@ -15,6 +15,7 @@ from placerec.errors import EvaluationError, MissingExtraError, OutputError, Pla
 from placerec.evaluation import compare as module
 from placerec.evaluation import contest, evaluate_files, material
 from placerec.evaluation.compare import compare
+from placerec.evaluation.comparison import Comparison
 from placerec.vision import Dictionary
 
 for package in ("sklearn", "matplotlib"):
@@ -35,13 +36,13 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def run(runs: Path, out: Path, **options: object) -> module.Comparison:
+def run(runs: Path, out: Path, **options: object) -> Comparison:
     chosen = {"methods": METHODS, "size": 3} | options
     return compare([runs], [runs / "run3", runs / "run4"], out, **chosen)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
-def done(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, module.Comparison]:
+def done(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Comparison]:
     out = tmp_path_factory.mktemp("compare") / "out"
     return out, run(runs, out)
 
@@ -60,7 +61,7 @@ def untimed(out: Path) -> dict[str, bytes | dict[str, dict[str, str]]]:
     return files | {"methods.csv": table, "pairs.csv": (out / "pairs.csv").read_bytes()}
 
 
-def test_every_method_has_a_line_with_what_evaluate_says(done: tuple[Path, module.Comparison]) -> None:
+def test_every_method_has_a_line_with_what_evaluate_says(done: tuple[Path, Comparison]) -> None:
     out, found = done
     assert (out / "methods.csv").read_text(encoding="utf-8").splitlines()[0] == COLUMNS
     table = rows(out)
@@ -78,7 +79,7 @@ def test_every_method_has_a_line_with_what_evaluate_says(done: tuple[Path, modul
     assert float(table["majority"]["accuracy"]) == found.majority == 0.5
 
 
-def test_every_two_methods_have_a_verdict(done: tuple[Path, module.Comparison]) -> None:
+def test_every_two_methods_have_a_verdict(done: tuple[Path, Comparison]) -> None:
     out, found = done
     lines = (out / "pairs.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "first,second,difference,difference_low,difference_high,verdict"
@@ -90,7 +91,7 @@ def test_every_two_methods_have_a_verdict(done: tuple[Path, module.Comparison]) 
 
 
 def test_a_second_run_does_nothing_again(
-    runs: Path, done: tuple[Path, module.Comparison], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    runs: Path, done: tuple[Path, Comparison], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
     shutil.copytree(done[0], out)
@@ -108,7 +109,7 @@ def test_a_second_run_does_nothing_again(
 
 
 def test_a_killed_run_goes_on_where_it_was(
-    runs: Path, done: tuple[Path, module.Comparison], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    runs: Path, done: tuple[Path, Comparison], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
     original, asked = contest.run_method, list[str]()
@@ -129,7 +130,7 @@ def test_a_killed_run_goes_on_where_it_was(
 
 
 def test_other_labels_or_images_are_not_taken_from_the_memory(
-    runs: Path, done: tuple[Path, module.Comparison], tmp_path: Path
+    runs: Path, done: tuple[Path, Comparison], tmp_path: Path
 ) -> None:
     out, again = tmp_path / "out", tmp_path / "runs"
     shutil.copytree(done[0], out)
@@ -146,7 +147,7 @@ def test_other_labels_or_images_are_not_taken_from_the_memory(
     assert evaluate_files([out / "beliefs/knn/run4.tsv"]).per_place["kitchen"].frames == 0
 
 
-def test_test_sequences_train_nothing(runs: Path, done: tuple[Path, module.Comparison], tmp_path: Path) -> None:
+def test_test_sequences_train_nothing(runs: Path, done: tuple[Path, Comparison], tmp_path: Path) -> None:
     named = [runs / f"run{seed}" for seed in range(3)]
     tests = [runs / "run3", runs / "run4"]
     compare(named, tests, tmp_path / "out", methods=METHODS, size=3, cache=done[0] / "cache")
@@ -154,7 +155,7 @@ def test_test_sequences_train_nothing(runs: Path, done: tuple[Path, module.Compa
 
 
 def test_a_single_test_sequence_says_what_its_interval_is(
-    runs: Path, tmp_path: Path, done: tuple[Path, module.Comparison], caplog: pytest.LogCaptureFixture
+    runs: Path, tmp_path: Path, done: tuple[Path, Comparison], caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING, logger="placerec"):
         found = compare(
@@ -188,7 +189,7 @@ def test_unknown_methods_and_none_are_refused_before_any_work(runs: Path, tmp_pa
 
 
 def test_without_scikit_learn_only_its_methods_are_refused(
-    runs: Path, done: tuple[Path, module.Comparison], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    runs: Path, done: tuple[Path, Comparison], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"ullah2008 needs .*scikit-learn.*--methods"):
@@ -226,7 +227,7 @@ def test_equal_names_get_their_parents_in_front(runs: Path, tmp_path: Path) -> N
     assert (tmp_path / "out/beliefs/majority/other-run0.tsv").exists()
 
 
-def test_the_cost_of_the_cascade_has_its_second_looks(done: tuple[Path, module.Comparison]) -> None:
+def test_the_cost_of_the_cascade_has_its_second_looks(done: tuple[Path, Comparison]) -> None:
     facts = json.loads((done[0] / "beliefs/pronobis2007/run.json").read_text(encoding="utf-8"))
     (score,) = (score for score in done[1].scores if score.method == "pronobis2007")
     assert score.consulted == facts["consulted"]

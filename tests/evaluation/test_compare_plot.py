@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from placerec.evaluation.compare import Comparison, MethodScore
 from placerec.evaluation.compare_plot import plot_comparison, spread
+from placerec.evaluation.comparison import Comparison, MethodScore
 from placerec.evaluation.material import Front
 
 pytest.importorskip("matplotlib")
