@@ -29,15 +29,13 @@ class Lesson:
     `prior` float64 (C,): how probable each place is before anything is seen. `delta`: what is added to every count.
     `steps` int64 (C, C): how often a frame at one place was followed by one at the other; `triples` int64 (C, C, C):
     how often a visit to one place (second index) came from another (first) and led to another (third). Both are None
-    where sentences were learned. `models`: the n-gram models of the places, of order `order`; empty where there are
-    none.
+    where sentences were learned. `models`: the n-gram models of the places; empty where there are none.
     """
 
     places: tuple[str, ...]
     vocabulary: tuple[str, ...] = field(repr=False)
     sentences: tuple[tuple[Ints, ...], ...] = field(repr=False)
     prior: Floats
-    order: int = 2
     delta: float = 1.0
     steps: Ints | None = field(default=None, repr=False)
     triples: Ints | None = field(default=None, repr=False)
@@ -55,7 +53,6 @@ def make_lesson(
     sentences: Mapping[str, Sentences],
     vocabulary: Sequence[str],
     *,
-    order: int = 2,
     delta: float = 1.0,
     steps: Ints | None = None,
     triples: Ints | None = None,
@@ -75,7 +72,7 @@ def make_lesson(
         raise ModelError(f"the word {error} of the sentences is not in the vocabulary; train the model again") from None
     words = np.array([sum(map(len, visits)) for visits in numbered], np.float64)
     prior = (words + 1 / len(words)) / (words.sum() + 1)
-    return Lesson(tuple(sentences), tuple(vocabulary), numbered, prior, order, delta, steps, triples, models or {})
+    return Lesson(tuple(sentences), tuple(vocabulary), numbered, prior, delta, steps, triples, models or {})
 
 
 def read_lesson(model: PlaceModels) -> Lesson:
@@ -88,7 +85,6 @@ def read_lesson(model: PlaceModels) -> Lesson:
     return make_lesson(
         {place: read_sentences(PlaceFiles.of(model.path, place).sentences) for place in model.models},
         read_vocabulary(model.path / VOCABULARY),
-        order=int(model.description["order"]),
         delta=float(model.description["delta"]) if added else 1.0,
         steps=record.transitions,
         triples=record.triples,

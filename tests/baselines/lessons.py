@@ -22,14 +22,14 @@ def lesson_of(
     steps: Ints | None = None,
     triples: Ints | None = None,
 ) -> Lesson:
-    """Places p0, p1... of sentences of word numbers; words w0, w1..."""
+    """Places p0, p1... of sentences of word numbers, words w0, w1..., with models of that order."""
     text = {f"p{c}": [[f"w{w}" for w in visit] for visit in visits] for c, visits in enumerate(sentences)}
     vocabulary = [f"w{w}" for w in range(words)]
     models = {
         place: estimate_place(count_ngrams(visits, order, vocabulary=vocabulary), Options(order))
         for place, visits in text.items()
     }
-    return make_lesson(text, vocabulary, order=order, steps=steps, triples=triples, models=models)
+    return make_lesson(text, vocabulary, steps=steps, triples=triples, models=models)
 
 
 def followed(follow: Follow, words: Sequence[int], elapsed: Sequence[int] | None = None) -> Floats:
