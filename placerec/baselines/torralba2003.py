@@ -21,8 +21,9 @@ from placerec.baselines.views import Floats, Mask, PointFollow, Views, filtered,
 from placerec.hohmm import Transition, filter_stream, learned_transition
 
 PROTOTYPES = 100
-# Widths that are tried, in units of the root mean square distance of the training frames from their mean.
-WIDTHS: tuple[float, ...] = tuple(2.0 ** (-j / 2) for j in range(13))
+# Widths that are tried, in units of the root mean square distance of the training frames from their mean. Wide ones
+# make the filter less sure: a remedy for neighbouring frames, which are alike, that sequences of 500 frames ask for.
+WIDTHS: tuple[float, ...] = tuple(2.0 ** (4 - j / 2) for j in range(21))
 _SMALLEST_BELIEF = 1e-15
 LN10 = float(np.log(10))
 
