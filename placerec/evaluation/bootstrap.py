@@ -18,6 +18,9 @@ from placerec.hohmm.beliefs import Beliefs
 
 DRAWS = 10_000
 LEVEL = 0.95
+# Of two equal methods one is better on each of five blocks in one case of 16, on each of six in one of 32: with fewer
+# than six no difference holds at the level, however clear the interval looks.
+LEAST = 6
 Floats = NDArray[np.float64]
 
 
@@ -31,18 +34,19 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Pair:
-    """Whether the accuracies of two methods differ: first - second, and its interval."""
+    """Whether the accuracies of two methods differ: first - second, and its interval over so many `blocks`."""
 
     first: str
     second: str
     difference: float
     low: float
     high: float
+    blocks: int
 
     @property
     def holds(self) -> bool:
-        """The interval leaves zero out."""
-        return self.low > 0 or self.high < 0
+        """The interval leaves zero out, and there are blocks enough to say so."""
+        return self.blocks >= LEAST and (self.low > 0 or self.high < 0)
 
 
 def count_blocks(beliefs: Sequence[Beliefs]) -> tuple[Blocks, Floats]:
@@ -91,5 +95,6 @@ def compare_pairs(right: dict[str, Floats], frames: NDArray[np.int64], drawn: ND
     pairs = []
     for first, second in combinations(right, 2):
         difference = right[first] - right[second]
-        pairs.append(Pair(first, second, float(difference.sum() / frames.sum()), *interval(drawn, difference, frames)))
+        share = float(difference.sum() / frames.sum())
+        pairs.append(Pair(first, second, share, *interval(drawn, difference, frames), len(frames)))
     return pairs

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from placerec.errors import EvaluationError, MissingExtraError, OutputError, SourceError
+from placerec.evaluation.bootstrap import LEAST
 from placerec.evaluation.compare_plot import plot_comparison
 from placerec.evaluation.comparison import Comparison, format_methods, format_pairs, judge
 from placerec.evaluation.contest import ALL, CASCADE, Contest, Run, run_method, train_models
@@ -174,6 +175,8 @@ def _tell(out: Path, found: Comparison) -> None:
         )
     else:
         log.info("%s: %d methods; intervals over %d test sequences", out, len(found.scores), number)
+    if number < LEAST:
+        log.warning("no difference between methods can hold with fewer than %d test %s", LEAST, what)
     log.info(
         "before every method a frame takes %.1f ms to describe and %.0f us to find its word, reading not counted",
         found.front.descriptor / 1000,

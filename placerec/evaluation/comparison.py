@@ -83,7 +83,7 @@ def format_methods(scores: Sequence[MethodScore]) -> str:
 
 
 def format_pairs(pairs: Sequence[Pair]) -> str:
-    """The text of pairs.csv: `holds` where the interval of the difference leaves zero out, else `cannot tell`."""
+    """The text of pairs.csv: `holds` or `cannot tell`, see `Pair.holds`."""
     lines = ["first,second,difference,difference_low,difference_high,verdict"]
     for pair in pairs:
         verdict = "holds" if pair.holds else "cannot tell"

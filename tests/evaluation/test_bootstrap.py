@@ -112,6 +112,16 @@ def test_pairs_are_judged_on_the_same_draws() -> None:
     assert high - low > 0.2
 
 
+def test_nothing_holds_on_fewer_than_six_blocks() -> None:
+    """One method better on all blocks: of two equal ones, more than one case of 20 with five, fewer with six."""
+    for blocks, holds in ((2, False), (5, False), (6, True)):
+        assert (2 * 0.5**blocks < 0.05) == holds
+        right = {"worse": np.full(blocks, 5.0), "better": np.full(blocks, 6.0)}
+        (pair,) = compare_pairs(right, np.full(blocks, 10), draw(blocks, 0))
+        assert pair.high < 0
+        assert pair.holds == holds
+
+
 def test_labels_decide_what_is_right_and_not_beliefs() -> None:
     one = judged("a", "hk", "hk")
     assert count_blocks([replace(one, best=("kitchen", "kitchen")), THREE[0]])[1].tolist() == [1, 3]
