@@ -31,6 +31,7 @@ _ROOMS = {
     "placerec.model": ("Decoding", "Options", "calibrate", "load_recognizer", "train_lm", "update"),
     "placerec.baselines": ("decode", "load_decoder"),
     "placerec.evaluation": ("evaluate", "evaluate_files", "inspect_decision"),
+    "placerec.evaluation.compare": ("compare",),
     "placerec.evaluation.look": ("show_frame", "show_words", "stability"),
     "placerec.lab": ("render_lab",),
 }
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from placerec.baselines import decode, load_decoder
     from placerec.errors import PlacerecError
     from placerec.evaluation import evaluate, evaluate_files, inspect_decision
+    from placerec.evaluation.compare import compare
     from placerec.evaluation.look import show_frame, show_words, stability
     from placerec.frames import Frame, Sequence, find_sequences, read_gray
     from placerec.hohmm import (
@@ -80,6 +82,7 @@ __all__ = [
     "__version__",
     "calibrate",
     "check_model",
+    "compare",
     "count_ngrams",
     "decode",
     "describe",

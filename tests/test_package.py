@@ -10,7 +10,7 @@ import pytest
 import placerec
 
 PACKAGE = Path(placerec.__file__).parent
-HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm")
+HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm", "sklearn")
 # A room imports only from rooms to its left, and these anyone may import.
 LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "demo", "cli")
 COMMON = {"errors", "files", "version"}

@@ -100,7 +100,7 @@ def log_word_p(lesson: Lesson) -> Floats:
 
 
 def normalised(scores: Floats) -> Floats:
-    """The belief (C,) in proportion to exp(scores)."""
-    belief: Floats = np.exp(scores - scores.max())
-    belief /= belief.sum()
+    """The belief (..., C) in proportion to exp(scores)."""
+    belief: Floats = np.exp(scores - scores.max(axis=-1, keepdims=True))
+    belief /= belief.sum(axis=-1, keepdims=True)
     return belief

@@ -9,6 +9,7 @@ import click
 
 from placerec.cli.calibrate import calibrate
 from placerec.cli.check import check
+from placerec.cli.compare import compare
 from placerec.cli.decode import decode
 from placerec.cli.demo import demo
 from placerec.cli.describe import describe
@@ -82,6 +83,7 @@ for command in (
     decode,
     evaluate,
     calibrate,
+    compare,
     inspect,
     check,
     lab,

@@ -27,6 +27,9 @@ class Decoder(Protocol):
 
     def __contains__(self, word: str) -> bool: ...
 
+    def reset(self) -> None:
+        """Forget the sequence so far."""
+
     def update(self, word: str, /, time: float | None = None, distance: float | None = None) -> Belief:
         """The belief after one more frame, its word, and the distance to it."""
 

@@ -1,0 +1,96 @@
+"""Ullah, Pronobis, Caputo, Luo & Jensfelt 2008: support vector machines, one image at a time.
+
+M. Ullah, A. Pronobis, B. Caputo, J. Luo, P. Jensfelt: "Towards robust place recognition for robot localization", ICRA
+2008, the baseline that came with the COLD data. Theirs matches local features (Harris-Laplace, SIFT) inside the kernel
+(from memory); here a linear machine of scikit-learn (one against the rest, C = 1, its defaults) sees the dictionary's
+global descriptor, so that what differs from the other systems is the decision and not the feature. A machine gives
+margins, not probabilities: their softmax at a temperature that is fitted on held-out training sequences. That changes
+no decision. `fit_filtered` divides these by the places' shares of the training frames and lets the project's filter
+have them as likelihoods, with learned transitions; that is not in the paper.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.baselines.lesson import normalised
+from placerec.baselines.views import Floats, PointFollow, Views, filtered, held_out_folds, scattered
+from placerec.errors import MissingExtraError
+from placerec.hohmm import fit_calibration, learned_transition
+
+LN10 = float(np.log(10))
+# The margin of a place that a fold of the training does not have: below any that occurs, and finite.
+_ABSENT = -20.0
+
+
+def fit(views: Views, *, seed: int = 0) -> PointFollow:
+    """Beliefs frame by frame; MissingExtraError without scikit-learn."""
+    scores = _scores(views, seed)
+
+    def step(point: Floats) -> Floats:
+        return normalised(scores(point))
+
+    return lambda: step
+
+
+def fit_filtered(views: Views, *, seed: int = 0) -> PointFollow:
+    """The same scores through the filter."""
+    scores = _scores(views, seed)
+    shares = np.bincount(views.truth, minlength=len(views.places)) / len(views.truth)
+    prior = np.log(shares)
+
+    def log10_p(point: Floats) -> list[float]:
+        logs: list[float] = ((scores(point) - prior) / LN10).tolist()
+        return logs
+
+    return filtered(log10_p, learned_transition(views.steps))
+
+
+def _scores(views: Views, seed: int) -> Callable[[Floats], Floats]:
+    """The margins of a point in each place (C,), over the temperature."""
+    everything = np.ones(len(views.truth), bool)
+    scale = float(np.sqrt(np.square(views.points).mean(axis=0).sum()))
+    weights, offsets = _machines(views, everything, scale, seed)
+    temperature = _temperature(views, scale, seed)
+
+    def scores(point: Floats) -> Floats:
+        tempered: Floats = margins(point[None] / scale, weights, offsets)[0] / temperature
+        return tempered
+
+    return scores
+
+
+def margins(points: Floats, weights: Floats, offsets: Floats) -> Floats:
+    """(n, C) of points (n, k)."""
+    # Not BLAS, whose sums depend on the number of its threads.
+    reached: Floats = np.einsum("nk,ck->nc", points, weights) + offsets
+    return reached
+
+
+def _machines(views: Views, among: NDArray[np.bool_], scale: float, seed: int) -> tuple[Floats, Floats]:
+    """One machine per place seen: weights (D, k) and offsets (D,)."""
+    try:
+        from sklearn.svm import LinearSVC
+    except ImportError as error:
+        raise MissingExtraError("scikit-learn", "ullah2008", "pip install 'placerec[systems]'") from error
+    machine = LinearSVC(dual=False, random_state=seed).fit(views.points[among] / scale, views.truth[among])
+    weights, offsets = machine.coef_, machine.intercept_
+    if len(weights) == 1:
+        # Of two places scikit-learn keeps the machine of the second.
+        return np.concatenate([-weights, weights]), np.concatenate([-offsets, offsets])
+    return weights, offsets
+
+
+def _temperature(views: Views, scale: float, seed: int) -> float:
+    """What makes the softmax of the margins believable on held-out training frames; 1 where no fold can tell."""
+    beliefs, truths = [], []
+    for held in held_out_folds(views.sequences):
+        columns = np.unique(views.truth[~held])
+        judged = held & np.isin(views.truth, columns)
+        if len(columns) > 1 and judged.any():
+            weights, offsets = _machines(views, ~held, scale, seed)
+            found = scattered(margins(views.points[judged] / scale, weights, offsets), columns, len(views.places))
+            beliefs.append(normalised(np.maximum(found, _ABSENT)))
+            truths.append(views.truth[judged])
+    return fit_calibration(np.concatenate(beliefs), np.concatenate(truths)).temperature if beliefs else 1.0

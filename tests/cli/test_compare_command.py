@@ -1,0 +1,63 @@
+"""`placerec compare` from the command line: its table, its files, and its refusals."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from small import write_images
+
+from placerec.cli import commands
+
+pytest.importorskip("matplotlib")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    for seed in range(3):
+        write_images(folder / f"run{seed}", seed)
+    return folder
+
+
+def test_it_prints_a_table_and_writes_the_folder(runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arguments = ["compare", runs, "--test", runs / "run2", "--methods", "majority,hohmm", "--size", 2, "-o", out]
+    done = CliRunner().invoke(commands, [*map(str, arguments)])
+    assert done.exit_code == 0, done.output
+    lines = done.stdout.splitlines()
+    assert lines[0].split()[:2] == ["method", "accuracy"]
+    assert [line.split()[0] for line in lines[1:3]] == ["hohmm", "majority"]
+    assert lines[3] == "12 frames; always 'hall': 50.0 %"
+    assert "over its 2 visits" in done.stderr
+    assert sorted(path.name for path in out.iterdir()) == [
+        "beliefs",
+        "cache",
+        "methods.csv",
+        "methods.png",
+        "pairs.csv",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--methods", "hohmm,svm"], 2, ("--methods", "'svm'", "torralba2003")),
+        (["--methods", ""], 2, ("--methods", "''")),
+        ([], 1, ("none is left to learn from",)),
+    ],
+)
+def test_what_cannot_be_compared_is_one_line(
+    runs: Path, tmp_path: Path, arguments: list[str], code: int, words: tuple[str, ...]
+) -> None:
+    done = CliRunner().invoke(
+        commands, ["compare", str(runs), "--test", str(runs), "-o", str(tmp_path / "out"), *arguments]
+    )
+    assert done.exit_code == code
+    assert all(word in done.stderr for word in words), done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_test_sequence_is_needed(runs: Path, tmp_path: Path) -> None:
+    done = CliRunner().invoke(commands, ["compare", str(runs), "-o", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "--test" in done.stderr
