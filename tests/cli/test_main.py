@@ -122,7 +122,9 @@ def test_an_interrupt_is_one_line_and_leaves_no_half_file(tmp_path: Path) -> Non
         "d = sys.modules['placerec.vision.describe']\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "real = d.describe_image\n"
-        "def slow(*args):\n    sys.stdout.write('ready\\n')\n    sys.stdout.flush()\n    time.sleep(0.2)\n    return real(*args)\n"
+        # One write: two threads are at work.
+        "def slow(*args):\n    sys.stdout.write('ready\\n')\n    sys.stdout.flush()\n"
+        "    time.sleep(0.2)\n    return real(*args)\n"
         "d.describe_image = slow\n"
         "from placerec.cli import main; main()\n"
     )
