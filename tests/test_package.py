@@ -12,7 +12,7 @@ import placerec
 PACKAGE = Path(placerec.__file__).parent
 HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm")
 # A room imports only from rooms to its left, and these anyone may import.
-LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "experiment", "demo", "cli")
+LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "experiments", "demo", "cli")
 COMMON = {"errors", "files", "jobs", "version"}
 ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     # A toolkit for text alone.

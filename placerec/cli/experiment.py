@@ -18,7 +18,7 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
     Every combination of order, smoothing, selection, map size and transitions that CONFIG.toml lists, for every seed
     and fold: results.csv, the paper's figure, its tables, its claims, and a page that shows all of it.
     """
-    from placerec.experiment import experiment as run
+    from placerec.experiments import experiment as run
     from placerec.jobs import processors
 
     results = run(config, out, jobs=jobs or processors(), progress=progress_bar)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.experiment.results import Row
+from placerec.experiments.results import Row
 
 DRAWS = 2000
 Floats = NDArray[np.float64]

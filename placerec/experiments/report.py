@@ -23,13 +23,13 @@ from placerec.evaluation import (
     table,
 )
 from placerec.evaluation.panels import strip_title
-from placerec.experiment.cells import Cell, believe_cell
-from placerec.experiment.claims import judge
-from placerec.experiment.commands import commands_of
-from placerec.experiment.config import Config
-from placerec.experiment.figure import draw_figure
-from placerec.experiment.results import Results, Way
-from placerec.experiment.tables import (
+from placerec.experiments.cells import Cell, believe_cell
+from placerec.experiments.claims import judge
+from placerec.experiments.commands import commands_of
+from placerec.experiments.config import Config
+from placerec.experiments.figure import draw_figure
+from placerec.experiments.results import Results, Way
+from placerec.experiments.tables import (
     Table,
     best_table,
     claims_table,
@@ -41,8 +41,8 @@ from placerec.experiment.tables import (
     runs_table,
     verdicts_table,
 )
-from placerec.experiment.tokens import draw_words
-from placerec.experiment.units import Unit
+from placerec.experiments.tokens import draw_words
+from placerec.experiments.units import Unit
 from placerec.files import read_text, write_text
 from placerec.hohmm import Beliefs
 from placerec.version import __version__

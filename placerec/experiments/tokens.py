@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from placerec.errors import ExperimentError, VisionError
 from placerec.evaluation.word_sheet import draw_word_sheet
 from placerec.evaluation.word_table import typical_paths, word_table
-from placerec.experiment import cache
+from placerec.experiments import cache
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import find_sequences
 from placerec.frames.folder import natural_key

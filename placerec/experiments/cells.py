@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.evaluation import evaluate
-from placerec.experiment import cache
+from placerec.experiments import cache
 from placerec.hohmm import Beliefs, Emissions, Transition, best_places, fixed_transition, learned_transition
 from placerec.hohmm.evidence import evidence_in
 from placerec.hohmm.offline import believe

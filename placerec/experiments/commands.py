@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from os.path import relpath
 from pathlib import Path
 
-from placerec.experiment.config import Config
-from placerec.experiment.results import Way
-from placerec.experiment.units import Unit
+from placerec.experiments.config import Config
+from placerec.experiments.results import Way
+from placerec.experiments.units import Unit
 
 
 def commands_of(plan: Config, way: Way, unit: Unit) -> str:

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from placerec.experiment.bootstrap import DRAWS
-from placerec.experiment.claims import HIGH, LEAST_SEQUENCES, Claim, Statement
-from placerec.experiment.results import FoldData, Results, Way, by_seed
+from placerec.experiments.bootstrap import DRAWS
+from placerec.experiments.claims import HIGH, LEAST_SEQUENCES, Claim, Statement
+from placerec.experiments.results import FoldData, Results, Way, by_seed
 
 PAPER_RUNS = {10: 3.15, 20: 2.67}
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]

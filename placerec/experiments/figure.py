@@ -11,8 +11,8 @@ import numpy as np
 
 from placerec.evaluation import figure_file
 from placerec.evaluation.panels import place_colours
-from placerec.experiment.config import Config
-from placerec.experiment.results import Row, Way, by_seed, way_of
+from placerec.experiments.config import Config
+from placerec.experiments.results import Row, Way, by_seed, way_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,11 +7,11 @@ from itertools import product
 from pathlib import Path
 
 from placerec.errors import ExperimentError
-from placerec.experiment import cache
-from placerec.experiment.cells import Cell, CellJob
-from placerec.experiment.config import Config
-from placerec.experiment.splits import SPLITS, Fold, named_tests
-from placerec.experiment.tokens import TokensJob, describe_all, find_images, make_tokens
+from placerec.experiments import cache
+from placerec.experiments.cells import Cell, CellJob
+from placerec.experiments.config import Config
+from placerec.experiments.splits import SPLITS, Fold, named_tests
+from placerec.experiments.tokens import TokensJob, describe_all, find_images, make_tokens
 from placerec.jobs import map_jobs
 from placerec.model.corpus import VOCABULARY, stream_files
 

@@ -28,7 +28,7 @@ from string import Formatter
 from typing import Any
 
 from placerec.errors import ExperimentError, PlacerecError
-from placerec.experiment.splits import SPLITS
+from placerec.experiments.splits import SPLITS
 from placerec.files import read_text
 from placerec.hohmm import PER
 from placerec.lm import SMOOTHINGS

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from placerec.errors import OutputError
-from placerec.experiment import cache
-from placerec.experiment.cells import Cell, run_cells
-from placerec.experiment.config import read_config
-from placerec.experiment.report import write_reports
-from placerec.experiment.results import FoldData, Results, Row, SequenceCount, write_results
-from placerec.experiment.units import ProgressBar, Unit, find_units
+from placerec.evaluation.panels import check_figure
+from placerec.experiments import cache
+from placerec.experiments.cells import Cell, run_cells
+from placerec.experiments.config import Config, read_config
+from placerec.experiments.report import write_reports
+from placerec.experiments.results import FoldData, Results, Row, SequenceCount, write_results
+from placerec.experiments.units import ProgressBar, Unit, find_units
 from placerec.files import held_folder
 from placerec.jobs import map_jobs
 
@@ -33,15 +34,22 @@ def experiment(config: Path | str, out: Path | str, *, jobs: int = 1, progress: 
     stands for.
     """
     plan, out = read_config(config), Path(out)
+    check_figure(out / "figure.png")
     with _at_work(out):
-        units = find_units(plan, out, jobs=jobs, progress=progress)
-        log.info("%d cells", sum(len(unit.job.cells) for unit in units))
-        with progress("recognise") as show:
-            found = map_jobs(run_cells, [unit.job for unit in units], jobs=jobs, progress=show)
-        results = collect(units, found)
-        write_results(results, out)
+        units, results = run_grid(plan, out, jobs=jobs, progress=progress)
         write_reports(results, plan, Path(config), units, out)
     return results
+
+
+def run_grid(plan: Config, out: Path, *, jobs: int = 1, progress: ProgressBar = _silence) -> tuple[list[Unit], Results]:
+    """The units of a config and the rows of all their cells, which are written to `out`."""
+    units = find_units(plan, out, jobs=jobs, progress=progress)
+    log.info("%d cells", sum(len(unit.job.cells) for unit in units))
+    with progress("recognise") as show:
+        found = map_jobs(run_cells, [unit.job for unit in units], jobs=jobs, progress=show)
+    results = collect(units, found)
+    write_results(results, out)
+    return units, results
 
 
 @contextmanager

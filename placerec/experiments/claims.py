@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placerec.experiment.bootstrap import Floats, MissingCellsError, Scores, interval, mean, scores
-from placerec.experiment.results import Results
+from placerec.experiments.bootstrap import Floats, MissingCellsError, Scores, interval, mean, scores
+from placerec.experiments.results import Results
 
 HOLDS, FAILS, UNKNOWN = "holds", "does not hold", "cannot tell"
 # Points: what counts as several percent, as no more than a little, and as among the best.
