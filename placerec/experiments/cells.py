@@ -24,7 +24,7 @@ from placerec.lm.trie import Trie
 from placerec.lm.union import unite_models
 from placerec.model import Corpus, Options, estimate_place, read_corpus
 from placerec.model.corpus import read_streams
-from placerec.words import Selection, WordStream, parse_selection
+from placerec.words import Selection, WordStream, parse_selection, place_steps
 
 log = logging.getLogger(__name__)
 
@@ -109,7 +109,7 @@ def _believed(job: CellJob, streams: _Streams, cells: Sequence[Cell]) -> Iterato
     for (smoothing, order), same in groupby(sorted(cells), lambda cell: cell[:2]):
         union = _models(streams.counts, smoothing, order)
         for cell in same:
-            transition = _transition(cell.transition, streams.corpus, job)
+            transition = _transition(cell.transition, streams, job)
             yield cell, [_filtered(test, union, streams.corpus, selection, transition) for test in streams.tests]
 
 
@@ -142,10 +142,11 @@ def seven_digits(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(rounded, np.rint(exact * unit) / unit, exact).astype(np.float32)
 
 
-def _transition(name: str, corpus: Corpus, job: CellJob) -> Transition:
-    if name == "learned" and corpus.record.transitions is not None:
-        return learned_transition(corpus.record.transitions)
-    return fixed_transition(len(corpus.sentences), job.stay, job.per)
+def _transition(name: str, streams: _Streams, job: CellJob) -> Transition:
+    places = list(streams.corpus.sentences)
+    if name == "fixed":
+        return fixed_transition(len(places), job.stay, job.per)
+    return learned_transition(np.sum([place_steps(stream, places) for stream in streams.training], axis=0))
 
 
 def _filtered(
@@ -161,7 +162,7 @@ def _filtered(
 def _beliefs(
     stream: WordStream, places: tuple[str, ...], selected: NDArray[np.bool_], belief: NDArray[np.float64]
 ) -> Beliefs:
-    best = best_places(places, belief)
+    best = best_places(places, belief.argmax(axis=1))
     return Beliefs(
         stream.name, places, stream.frames, stream.times, stream.places, stream.words, selected, best, belief
     )

@@ -1,6 +1,7 @@
 """The report of an experiment: figure, tables and claims as files, and one page that shows all of it."""
 
 import platform
+import shlex
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -77,7 +78,7 @@ def write_reports(results: Results, plan: Config, config: Path, units: Sequence[
         _table(runs_table(results.folds), "Frames in a row with the same word, in training."),
         *_closer_look(results, units),
         heading("Do it again"),
-        preformatted(f"placerec experiment {config.name} -o {out.name}/"),
+        preformatted(f"placerec experiment {shlex.quote(config.name)} -o {shlex.quote(out.resolve().name)}/"),
         paragraph(f"{config.name}:"),
         preformatted(read_text(config, ExperimentError)),
         paragraph(f"The best way of the grid, step by step ({ranked(results)[0]}; seed 0):"),
