@@ -24,6 +24,7 @@ from placerec.evaluation import (
     table,
 )
 from placerec.evaluation.panels import strip_title
+from placerec.experiments import cache
 from placerec.experiments.cells import Cell, believe_cell
 from placerec.experiments.claims import judge
 from placerec.experiments.commands import commands_of
@@ -52,11 +53,30 @@ _PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib")
 
 
 def write_reports(results: Results, plan: Config, config: Path, units: Sequence[Unit], out: Path) -> None:
-    """Write figure.png and figure.svg, tables.md, claims.md and report.html into `out`.
+    """Write figure.png and figure.svg, tables.md, claims.md and report.html into `out`, unless they are there already.
 
     With more than one kind of transitions the first of the config has the figure, others figure-NAME. Raises
     MissingExtraError without matplotlib.
     """
+    record, key = out / "cache" / "report.json", _key(config, units, out)
+    if cache.load(record) != {"key": key, "files": _contents(out)}:
+        _write(results, plan, config, units, out)
+        cache.save(record, {"key": key, "files": _contents(out)})
+
+
+def _key(config: Path, units: Sequence[Unit], out: Path) -> str:
+    """What all that is written here depends on."""
+    rows = [cache.content_of(out / name) for name in ("results.csv", "sequences.csv")]
+    made_of = [(unit.job.kept.name, unit.images.folder.name if unit.images else "") for unit in units]
+    return cache.key_of("report", rows, made_of, str(config), read_text(config, ExperimentError), str(out), _versions())
+
+
+def _contents(out: Path) -> dict[str, str]:
+    paths = sorted(path for pattern in ("*.md", "*.html", "figure*") for path in out.glob(pattern))
+    return {path.name: cache.content_of(path) for path in paths}
+
+
+def _write(results: Results, plan: Config, config: Path, units: Sequence[Unit], out: Path) -> None:
     note = reading(len({name for row in results.rows for name in row.sequences}), plan.seeds)
     claims = {transition: judge(results, transition) for transition in plan.transition}
     write_text(out / "tables.md", format_tables(results))
@@ -93,6 +113,8 @@ _CAPTION = "Mean over seeds, with one standard deviation. Dotted: always the mos
 
 def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
     """Draw the paper's figure for each kind of transitions, as PNG and SVG."""
+    for old in out.glob("figure-*"):
+        old.unlink()
     for number, transition in enumerate(plan.transition):
         rows, title = [row for row in results.rows if row.transition == transition], f"{transition} transitions"
         path = out / f"figure{f'-{transition}' if number else ''}.svg"

@@ -129,6 +129,13 @@ class TokensJob:
         ]
         return self.cache / "tokens" / cache.key_of("tokens", self.words.stem, labels)
 
+    @property
+    def made(self) -> bool:
+        """Whether all that `make_tokens` writes is there."""
+        names = [f"{one.sequence.name}.tsv" for one in (*self.train, *self.test)]
+        folder = self.folder
+        return self.words.exists() and all((folder / name).exists() for name in (*names, "vocab.txt"))
+
 
 def make_tokens(job: TokensJob) -> None:
     """Learn the words and write the token streams, as `train-words` and `tokenize` do."""

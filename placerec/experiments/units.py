@@ -44,7 +44,7 @@ def _image_units(plan: Config, out: Path, jobs: int, progress: ProgressBar) -> I
     for size, seed, fold in product(plan.size, range(plan.seeds), folds):
         train, test = (tuple(of[name] for name in names) for names in (fold.train, fold.test))
         todo[size, seed, fold.name] = TokensJob(train, test, size, seed, plan.units, out / "cache")
-    missing = [job for job in todo.values() if not job.folder.exists()]
+    missing = [job for job in todo.values() if not job.made]
     with progress("learn words") as show:
         map_jobs(make_tokens, missing, jobs=jobs, progress=show)
     for fold in folds:

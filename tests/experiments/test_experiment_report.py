@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -11,9 +12,10 @@ from small import write_images
 
 from placerec.cli import commands
 from placerec.evaluation import evaluate_files
-from placerec.experiments import experiment
+from placerec.experiments import Config, Results, experiment, report
 from placerec.experiments.claims import CLAIMS
 from placerec.experiments.tables import markdown, ranked
+from placerec.experiments.units import Unit
 
 IMAGES = """
 [data]
@@ -90,6 +92,28 @@ def test_the_commands_of_the_page_give_the_best_row(world: Path, monkeypatch: py
         r for r in results.rows if (r.select, r.order, r.transition) == (best.select, best.order, best.transition)
     ]
     assert evaluate_files([world / "beliefs"]).accuracy == row.accuracy
+
+
+def test_what_is_there_is_not_made_again(world: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pages: list[Path] = []
+    real = report._write
+
+    def write(results: Results, plan: Config, config: Path, units: Sequence[Unit], out: Path) -> None:
+        pages.append(out)
+        real(results, plan, config, units, out)
+
+    monkeypatch.setattr(report, "_write", write)
+    page = world / "out" / "report.html"
+    whole = page.read_bytes()
+    experiment(world / "grid.toml", world / "out")
+    assert (pages, page.read_bytes()) == ([], whole)
+    page.write_bytes(whole[:1000])
+    experiment(world / "grid.toml", world / "out")
+    assert (len(pages), page.read_bytes()) == (1, whole)
+    (world / "grid.toml").write_text((world / "grid.toml").read_text() + "# A note.\n")
+    experiment(world / "grid.toml", world / "out")
+    assert len(pages) == 2
+    assert b"# A note." in page.read_bytes()
 
 
 def test_several_folds_have_rows_strips_and_tables(tmp_path: Path) -> None:

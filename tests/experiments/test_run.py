@@ -76,6 +76,11 @@ def test_a_second_run_does_only_what_changed(tmp_path: Path, work: Counter[str])
     path.write_text(IMAGES)
     assert done() == {}
     assert outputs(out) == first
+    # What was removed by hand is made again, and nothing else.
+    for folder, pattern in (("words", "*.npz"), ("tokens", "*/a.tsv"), ("descriptors", "*.npz")):
+        next((out / "cache" / folder).glob(pattern)).unlink()
+    assert done()["_describe"] == 1
+    assert outputs(out) == first
     # One image more: its sequence is described, and everything that it trains or tests, done anew.
     write_images(tmp_path / "more", 9, frames=1)
     (image,) = (tmp_path / "more" / "std_cam").iterdir()
