@@ -17,6 +17,18 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
 
     Every combination of order, smoothing, selection, map size and transitions that CONFIG.toml lists, for every seed
     and fold: results.csv, the paper's figure, its tables, its claims, and a page that shows all of it.
+
+    \b
+    [data]
+    sequences = ["recordings/*"]  # or tokens = "tokens/{size}-{seed}"
+    test = ["run3*"]  # or split = "leave-one-out", "leave-one-illumination-out"
+    [grid]
+    order = [1, 2, 3, 4, 5, 6]
+    smoothing = ["witten-bell", "lidstone-backoff"]
+    select = ["none", "subsample:3", "subsample:5", "compress:3", "unique"]
+    size = [10, 20]
+    transition = ["fixed", "learned"]
+    seeds = 5
     """
     from placerec.experiments import experiment as run
     from placerec.jobs import processors
