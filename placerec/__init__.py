@@ -33,6 +33,7 @@ _ROOMS = {
     "placerec.evaluation": ("evaluate", "evaluate_files", "inspect_decision"),
     "placerec.evaluation.compare": ("compare",),
     "placerec.evaluation.look": ("show_frame", "show_words", "stability"),
+    "placerec.experiments": ("experiment",),
     "placerec.lab": ("render_lab",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from placerec.evaluation import evaluate, evaluate_files, inspect_decision
     from placerec.evaluation.compare import compare
     from placerec.evaluation.look import show_frame, show_words, stability
+    from placerec.experiments import experiment
     from placerec.frames import Frame, Sequence, find_sequences, read_gray
     from placerec.hohmm import (
         Belief,
@@ -89,6 +91,7 @@ __all__ = [
     "estimate",
     "evaluate",
     "evaluate_files",
+    "experiment",
     "filter_stream",
     "find_sequences",
     "fixed_transition",

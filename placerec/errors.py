@@ -31,6 +31,10 @@ class EvaluationError(PlacerecError):
     """Beliefs that cannot be judged or drawn."""
 
 
+class ExperimentError(PlacerecError):
+    """The description of an experiment, or data that do not fit it."""
+
+
 class OutputError(PlacerecError):
     """An output that cannot be written."""
 

@@ -12,8 +12,8 @@ import placerec
 PACKAGE = Path(placerec.__file__).parent
 HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm", "sklearn")
 # A room imports only from rooms to its left, and these anyone may import.
-LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "demo", "cli")
-COMMON = {"errors", "files", "version"}
+LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "experiments", "demo", "cli")
+COMMON = {"errors", "files", "jobs", "version"}
 ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     # A toolkit for text alone.
     "lm": COMMON | {"lm"},
@@ -23,6 +23,7 @@ ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     "demo": COMMON | set(LINE[:-1]) | {"lab"},
     "cli": COMMON | set(LINE) | {"lab", "srilm"},
     "files": {"errors"},
+    "jobs": {"errors"},
     "errors": set(),
     "version": set(),
     "reference": set(),

@@ -14,6 +14,7 @@ from placerec.cli.decode import decode
 from placerec.cli.demo import demo
 from placerec.cli.describe import describe
 from placerec.cli.evaluate import evaluate
+from placerec.cli.experiment import experiment
 from placerec.cli.inspect import inspect
 from placerec.cli.lab import lab
 from placerec.cli.show_frame import show_frame
@@ -87,6 +88,7 @@ for command in (
     inspect,
     check,
     lab,
+    experiment,
     demo,
 ):
     commands.add_command(command)

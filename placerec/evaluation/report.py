@@ -79,21 +79,26 @@ def preformatted(text: str) -> str:
     return f"<pre>{html.escape(text)}</pre>"
 
 
-def picture(image: Path | str | bytes, alt: str, caption: str) -> str:
+def picture(image: Path | str | bytes, alt: str, caption: str, *, narrow: Path | str | bytes | None = None) -> str:
     """A PNG, JPEG or SVG picture, kept inside the page; `alt` is what someone who cannot see it is told.
 
-    image: a file or its bytes. Raises EvaluationError if the file cannot be read or holds no such picture.
+    image: a file or its bytes; `narrow`: what stands in its place on a narrow screen. Raises EvaluationError if a file
+    cannot be read or holds no such picture.
     """
+    shown = f'<img src="{_address(image)}" alt="{html.escape(alt)}">'
+    if narrow is not None:
+        shown = f'<picture><source media="(max-width: 40rem)" srcset="{_address(narrow)}">{shown}</picture>'
+    return f"<figure>{shown}\n<figcaption>{html.escape(caption)}</figcaption></figure>"
+
+
+def _address(image: Path | str | bytes) -> str:
+    """The picture itself, where its address would stand."""
     source = "the picture" if isinstance(image, bytes) else str(image)
     try:
         data = image if isinstance(image, bytes) else Path(image).read_bytes()
     except OSError as error:
         raise EvaluationError(f"{source}: cannot be read: {error.strerror}") from error
-    encoded = base64.b64encode(data).decode("ascii")
-    return (
-        f'<figure><img src="data:{_kind(data, source)};base64,{encoded}" alt="{html.escape(alt)}">\n'
-        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
-    )
+    return f"data:{_kind(data, source)};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]], caption: str) -> str:

@@ -1,0 +1,91 @@
+"""Which sequences train and which test: the folds of an experiment, by the names of its sequences."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from placerec.errors import ExperimentError
+
+# As find_sequences names them: the folder's name, perhaps behind its parent's.
+_COLD = re.compile(r"(?:.*[-_])?seq([1-4])_(cloudy|night|sunny)([0-9]+)")
+_ILLUMINATION = re.compile(r".*(cloudy|night|sunny)[0-9]*")
+ILLUMINATIONS = ("cloudy", "night", "sunny")
+
+
+@dataclass(frozen=True)
+class Fold:
+    """One way to divide the sequences, whose names are given in their order."""
+
+    name: str
+    train: tuple[str, ...]
+    test: tuple[str, ...]
+
+
+def named_tests(names: Sequence[str], globs: Sequence[str]) -> list[Fold]:
+    """One fold: the sequences that one of `globs` matches test, all others train."""
+    for glob in globs:
+        if not any(fnmatchcase(name, glob) for name in names):
+            raise ExperimentError(f"[data] test: {glob!r} is the name of no sequence; they are {_some(names)}")
+    test = [name for name in names if any(fnmatchcase(name, glob) for glob in globs)]
+    return [_fold("test", names, test)]
+
+
+def leave_one_out(names: Sequence[str]) -> list[Fold]:
+    """A fold per sequence, which it is named after."""
+    return [_fold(name, names, [name]) for name in names]
+
+
+def leave_one_illumination_out(names: Sequence[str]) -> list[Fold]:
+    """A fold per illumination: cloudy, night, sunny, which the names of COLD's sequences end in, before a number."""
+    light = {name: match[1] for name in names if (match := _ILLUMINATION.fullmatch(name))}
+    for name in names:
+        if name not in light:
+            raise ExperimentError(
+                f"[data] split: leave-one-illumination-out needs names that end in cloudy, night or sunny and a "
+                f"number, and {name!r} does not; leave that sequence out, or name the tests"
+            )
+    found = [one for one in ILLUMINATIONS if one in light.values()]
+    return [_fold(one, names, [name for name in names if light[name] == one]) for one in found]
+
+
+def cold_saarbruecken_b(names: Sequence[str]) -> list[Fold]:
+    """The paper's: of part B (seq3, seq4) of COLD's Saarbruecken, runs 1 and 2 train and run 3 tests (readings 0.3).
+
+    Sequences of part A are left out. Raises ExperimentError unless the 18 sequences of part B are there, once each.
+    """
+    parts = {name: match for name in names if (match := _COLD.fullmatch(name))}
+    for name in names:
+        if name not in parts:
+            raise ExperimentError(
+                f"[data] split: cold-saarbruecken-b needs COLD's names (seq3_cloudy1), and {name!r} is none; "
+                "leave that sequence out, or name the tests"
+            )
+    used = [name for name in names if parts[name][1] in "34"]
+    found = [f"seq{m[1]}_{m[2]}{m[3]}" for m in map(parts.__getitem__, used)]
+    for wanted in (f"seq{path}_{light}{run}" for path in "34" for light in ILLUMINATIONS for run in "123"):
+        if found.count(wanted) != 1:
+            times = found.count(wanted) or "not"
+            raise ExperimentError(
+                f"[data] split: cold-saarbruecken-b needs each sequence of part B once, and {wanted} is there {times}"
+                f"{' times' * (times != 'not')}; complete them, or name the tests"
+            )
+    return [_fold("test", [n for n in used if parts[n][3] in "123"], [n for n in used if parts[n][3] == "3"])]
+
+
+SPLITS: dict[str, Callable[[Sequence[str]], list[Fold]]] = {
+    "leave-one-out": leave_one_out,
+    "leave-one-illumination-out": leave_one_illumination_out,
+    "cold-saarbruecken-b": cold_saarbruecken_b,
+}
+
+
+def _fold(name: str, names: Sequence[str], test: Sequence[str]) -> Fold:
+    train = tuple(one for one in names if one not in test)
+    if not train:
+        raise ExperimentError(f"[data]: all sequences test ({_some(names)}), and none is left to train; add others")
+    return Fold(name, train, tuple(test))
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

@@ -1,0 +1,100 @@
+"""Work in several processes: order, notes, failures, and no process that outlives its parent."""
+
+import logging
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from placerec.errors import PlacerecError, StreamError
+from placerec.jobs import map_jobs, processors
+
+log = logging.getLogger("placerec.test")
+
+
+def note(number: int) -> int:
+    time.sleep(0.1 / (1 + number))
+    log.warning("%d of many", number)
+    log.debug("not asked for")
+    return number**2
+
+
+def fail(number: int) -> int:
+    if number == 2:
+        raise StreamError("two cannot be used; take three")
+    return number
+
+
+def die(number: int) -> int:
+    os.kill(os.getpid(), 9)
+    return number
+
+
+def wait(path: str) -> None:
+    Path(path).write_text(str(os.getpid()))
+    time.sleep(60)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_results_and_notes_are_in_order(jobs: int, caplog: pytest.LogCaptureFixture) -> None:
+    told = []
+    with caplog.at_level(logging.WARNING, "placerec"):
+        results = map_jobs(note, [1, 2, 3, 4], jobs=jobs, progress=lambda done, total: told.append((done, total)))
+    assert results == [1, 4, 9, 16]
+    assert [record.getMessage() for record in caplog.records] == [f"{n} of many" for n in (1, 2, 3, 4)]
+    assert told == [(n, 4) for n in (1, 2, 3, 4)]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_exception_comes_through(jobs: int) -> None:
+    with pytest.raises(StreamError, match="two cannot be used; take three"):
+        map_jobs(fail, [1, 2, 3], jobs=jobs)
+
+
+def test_a_killed_process_is_told() -> None:
+    with pytest.raises(PlacerecError, match="was killed; give it more memory, or fewer jobs"):
+        map_jobs(die, [1, 2], jobs=2)
+
+
+def test_nothing_to_do_and_processors() -> None:
+    assert map_jobs(fail, [], jobs=2) == []
+    assert processors() >= 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="other signals there")
+def test_workers_end_with_their_parent(tmp_path: Path) -> None:
+    paths = [str(tmp_path / "a"), str(tmp_path / "b")]
+    program = tmp_path / "program.py"
+    program.write_text(
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "from placerec.jobs import map_jobs\nfrom test_jobs import wait\n"
+        f"if __name__ == '__main__':\n    map_jobs(wait, {paths!r}, jobs=2)\n"
+    )
+    with subprocess.Popen([sys.executable, str(program)]) as parent:
+        workers = [_number_in(Path(path)) for path in paths]
+        parent.kill()
+    until = time.monotonic() + 20
+    while any(map(_runs, workers)):
+        assert time.monotonic() < until, "a worker outlived its parent"
+        time.sleep(0.05)
+
+
+def _number_in(path: Path) -> int:
+    until = time.monotonic() + 30
+    while not path.exists() or not path.read_text():
+        assert time.monotonic() < until, "the worker never began"
+        time.sleep(0.05)
+    return int(path.read_text())
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    # Nobody waits for it any more: it may stay as an entry without a process.
+    stat = Path(f"/proc/{pid}/stat")
+    return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
