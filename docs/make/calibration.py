@@ -11,8 +11,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from held_out import Floats, arguments, described, filtered, folds, part, trained
+from held_out import Floats, filtered, part, trained
 from numpy.typing import NDArray
+from single_frame import arguments, described, fold_names
 from sklearn.isotonic import IsotonicRegression
 
 from placerec.evaluation.confidence import reliability
@@ -97,7 +98,7 @@ def rows(folder: Path, test: list[str]) -> str:
     """A set's lines."""
     frames = described(folder)
     maps: dict[int, Half] = {}
-    for names in folds(frames, test):
+    for names in fold_names(frames, test):
         others = [name for name in dict.fromkeys(frames.sequences) if name not in names]
         for number, case in enumerate(trained(part(frames, others), part(frames, names))):
             column = {place: i for i, place in enumerate(case.places)}

@@ -1,20 +1,15 @@
 """What the programs here share: words and models of some sequences, and what they say of others."""
 
-import argparse
-import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatch
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.frames import find_sequences
 from placerec.hohmm import filter_stream, fixed_transition
 from placerec.lm import count_ngrams
 from placerec.model.train import Options, estimate_place
-from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary
 from placerec.words import Selection, Sentences, WordStream, sentences_per_place
 from placerec.words.tokenize import tokens_of
 
@@ -36,29 +31,6 @@ class Trained:
     def places(self) -> list[str]:
         """The places, in the order of the columns."""
         return list(self.sentences)
-
-
-def arguments(text: str | None) -> argparse.Namespace:
-    """DATA/SET... and --test GLOB."""
-    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("data", metavar="DATA/SET", nargs="+", type=Path)
-    parser.add_argument(
-        "--test", metavar="GLOB", action="append", default=[], help="names of the test sequences; else one by one"
-    )
-    logging.disable(logging.WARNING)
-    return parser.parse_args()
-
-
-def described(folder: Path) -> Descriptors:
-    """The frames of all sequences of a set."""
-    return describe(find_sequences([folder]))
-
-
-def folds(frames: Descriptors, test: Sequence[str]) -> list[list[str]]:
-    """The test sequences of each fold: those that `test` names, or else one after the other."""
-    names = list(dict.fromkeys(frames.sequences))
-    named = [name for name in names if any(fnmatch(name, glob) for glob in test)]
-    return [named] if named else [[name] for name in names]
 
 
 def part(frames: Descriptors, names: Sequence[str], without: str = "") -> Descriptors:

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from held_out import arguments, described, folds, part
-from single_frame import SEEDS, SIZE
+from held_out import part
+from single_frame import SEEDS, SIZE, arguments, described, fold_names
 
 from placerec.evaluation import Evaluation, evaluate
 from placerec.hohmm import Beliefs, Recognizer, Transition, fixed_transition, learned_transition
@@ -79,7 +79,7 @@ def maps(folder: Path, test: Sequence[str]) -> Iterator[Found]:
     names = [*dict.fromkeys(frames.sequences)]
     for seed in SEEDS:
         whole: Found = {}
-        for tested in folds(frames, test):
+        for tested in fold_names(frames, test):
             training = part(frames, [name for name in names if name not in tested])
             dictionary = Dictionary.fit(training.values, spec=frames.spec, size=SIZE, seed=seed)
             streams = tokens_of(training, dictionary), tokens_of(part(frames, tested), dictionary)

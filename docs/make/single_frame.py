@@ -41,12 +41,16 @@ def described(folder: Path, kind: str = "gist") -> Descriptors:
     return describe(find_sequences([folder]), DescriptorSpec(kind=kind))
 
 
-def folds(frames: Descriptors, test: Sequence[str]) -> list[NDArray[np.bool_]]:
-    """Per fold which frames test: those of the sequences that `test` globs, else each sequence in turn."""
+def fold_names(frames: Descriptors, test: Sequence[str]) -> list[list[str]]:
+    """The test sequences of each fold: those that `test` globs, else each sequence in turn."""
     names = list(dict.fromkeys(frames.sequences))
     chosen = [name for name in names if any(fnmatchcase(name, glob) for glob in test)]
-    groups = [chosen] if chosen else [[name] for name in names]
-    return [np.isin(frames.sequences, group) for group in groups]
+    return [chosen] if chosen else [[name] for name in names]
+
+
+def folds(frames: Descriptors, test: Sequence[str]) -> list[NDArray[np.bool_]]:
+    """Per fold which frames test."""
+    return [np.isin(frames.sequences, names) for names in fold_names(frames, test)]
 
 
 def fitted(frames: Descriptors, tests: NDArray[np.bool_]) -> Iterator[Dictionary]:

@@ -10,7 +10,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from held_out import Floats, Trained, arguments, described, filtered, folds, part, trained
+from held_out import Floats, Trained, filtered, part, trained
+from single_frame import arguments, described, fold_names
 
 from placerec.evaluation.confidence import new_places
 from placerec.hohmm import filter_stream
@@ -68,7 +69,7 @@ def row(folder: Path, frames: Descriptors, test: list[str], place: str) -> str:
     """A line of the table; the frames of all folds are judged together, map by map."""
     judged: dict[int, list[Floats]] = {}
     new = []
-    for names in folds(frames, test):
+    for names in fold_names(frames, test):
         training = training_of(frames, names, place)
         if training is None:
             continue
