@@ -9,6 +9,7 @@ import numpy as np
 from placerec.baselines.lesson import Follow
 from placerec.errors import ModelError, StreamError
 from placerec.hohmm import Belief, Beliefs, best_places
+from placerec.hohmm.recognizer import warn_of_strange_words
 from placerec.words import Selection, WordStream, selector
 
 log = logging.getLogger(__name__)
@@ -84,10 +85,7 @@ class Follower:
         there is a largest gap and a frame has no time or time goes back.
         """
         self.reset()
-        strange = [word for word in stream.words if word not in self]
-        if strange:
-            message = "%s: words that the models do not list: %d skipped, %r first"
-            log.warning(message, stream.name, len(strange), strange[0])
+        warn_of_strange_words(stream, self._index)
         selected = np.zeros(len(stream), bool)
         belief, unknown = np.empty((len(stream), len(self.places))), np.zeros(len(stream))
         for i, (word, time) in enumerate(zip(stream.words, stream.times.tolist(), strict=True)):

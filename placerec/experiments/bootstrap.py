@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.evaluation.bootstrap import draw
 from placerec.experiments.results import Row
 
 DRAWS = 2000
@@ -99,9 +100,7 @@ def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
 
 def drawn(sequences: int, draws: int) -> Floats:
     """How often each sequence is there, float64 (1 + draws, sequences): once each, then as a fixed seed draws them."""
-    rng = np.random.Generator(np.random.PCG64(0))
-    counts = rng.multinomial(sequences, np.full(sequences, 1 / sequences), size=draws)
-    return np.concatenate([np.ones((1, sequences)), counts.astype(np.float64)])
+    return np.concatenate([np.ones((1, sequences)), draw(sequences, 0, draws).astype(np.float64)])
 
 
 def interval(values: Floats) -> tuple[float, float]:

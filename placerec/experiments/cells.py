@@ -4,7 +4,6 @@ The numbers are those of `train-lm`, `decode` and `evaluate` on the same streams
 highest order, and the probabilities are rounded as ARPA files hold them.
 """
 
-import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -19,14 +18,13 @@ from placerec.experiments import cache
 from placerec.hohmm import Beliefs, Emissions, Transition, best_places, fixed_transition, learned_transition
 from placerec.hohmm.evidence import evidence_in
 from placerec.hohmm.offline import believe
+from placerec.hohmm.recognizer import warn_of_strange_words
 from placerec.lm import BackoffModel, NgramCounts, count_ngrams
 from placerec.lm.trie import Trie
 from placerec.lm.union import unite_models
 from placerec.model import Corpus, Options, estimate_place, read_corpus
 from placerec.model.corpus import read_streams
 from placerec.words import Selection, WordStream, parse_selection, place_steps
-
-log = logging.getLogger(__name__)
 
 
 class Cell(NamedTuple):
@@ -96,7 +94,9 @@ def _read(job: CellJob, cells: Sequence[Cell]) -> _Streams:
 
 def _computed(job: CellJob, cells: Sequence[Cell]) -> dict[str, Any]:
     streams = _read(job, cells)
-    _warn_of_strange_words(streams.tests, streams.corpus.vocabulary)
+    listed = frozenset(streams.corpus.vocabulary)
+    for stream in streams.tests:
+        warn_of_strange_words(stream, listed)
     results: dict[str, Any] = {"data": describe_data(streams.training, streams.tests)}
     for smoothing in dict.fromkeys(cell.smoothing for cell in cells):
         results[f"frame-wise {smoothing}"] = _frame_wise(streams, smoothing)
@@ -214,13 +214,3 @@ def describe_data(training: Sequence[WordStream], tests: Sequence[WordStream]) -
 def _images(streams: Sequence[WordStream]) -> dict[str, int]:
     labels = [place for stream in streams for place in stream.places if place]
     return {place: labels.count(place) for place in sorted(set(labels))}
-
-
-def _warn_of_strange_words(tests: Sequence[WordStream], vocabulary: Sequence[str]) -> None:
-    listed = frozenset(vocabulary)
-    for stream in tests:
-        strange = [word for word in stream.words if word not in listed]
-        if strange:
-            log.warning(
-                "%s: words that are not in vocab.txt: %d skipped, %r first", stream.name, len(strange), strange[0]
-            )

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -170,7 +170,7 @@ class Recognizer:
         `smooth`, `lag`: see `believe`; later words count. `viterbi`: `best` is the most probable path. Words that the
         models do not list are skipped as `skip` does, and counted in a warning. Raises StreamError as `evidence_in`.
         """
-        self._warn_of_strange_words(stream)
+        warn_of_strange_words(stream, self._words)
         parts = list(self.evidence(stream))
         decoded = [self._decoded(part, stream, smooth=smooth, viterbi=viterbi, lag=lag) for part in parts]
         if len(parts) > 1:
@@ -264,8 +264,10 @@ class Recognizer:
             raise ModelError("an image needs a dictionary to become a word; give the recognizer the words.npz")
         return self.dictionary.look(image)
 
-    def _warn_of_strange_words(self, stream: WordStream) -> None:
-        strange = [word for word in stream.words if word not in self._words]
-        if strange:
-            message = "%s: words that the models do not list: %d skipped, %r first"
-            log.warning(message, stream.name, len(strange), strange[0])
+
+def warn_of_strange_words(stream: WordStream, known: Container[str]) -> None:
+    """Say how many words of a stream are not `known`, if any."""
+    strange = [word for word in stream.words if word not in known]
+    if strange:
+        message = "%s: words that the models do not list: %d skipped, %r first"
+        log.warning(message, stream.name, len(strange), strange[0])
