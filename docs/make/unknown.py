@@ -78,7 +78,8 @@ def row(folder: Path, frames: Descriptors, test: list[str], place: str) -> str:
         new.append(labels[labels != ""] == place)
         for number, case in enumerate(trained(training, tests)):
             judged.setdefault(number, []).append(np.concatenate(scores(case))[labels != ""])
-    is_new = np.concatenate(new)
+    # A set too small to do without the place gives no line.
+    is_new = np.concatenate([np.zeros(0, np.bool_), *new])
     maps = [np.concatenate(parts) for parts in judged.values()]
     if not is_new.any():
         return ""
