@@ -10,7 +10,7 @@ from placerec.version import __version__
 
 _ROOMS = {
     "placerec.errors": ("PlacerecError",),
-    "placerec.frames": ("Frame", "Sequence", "find_sequences", "read_gray"),
+    "placerec.frames": ("Frame", "Reading", "Sequence", "find_sequences", "read_gray"),
     "placerec.vision": ("DescriptorSpec", "Dictionary", "describe", "gist", "train_dictionary"),
     "placerec.words": ("Selection", "WordStream", "parse_selection", "read_stream", "select", "write_stream"),
     "placerec.words.tokenize": ("tokenize",),
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from placerec.evaluation.compare import compare
     from placerec.evaluation.look import show_frame, show_words, stability
     from placerec.experiments import experiment
-    from placerec.frames import Frame, Sequence, find_sequences, read_gray
+    from placerec.frames import Frame, Reading, Sequence, find_sequences, read_gray
     from placerec.hohmm import (
         Belief,
         Beliefs,
@@ -76,6 +76,7 @@ __all__ = [
     "Frame",
     "Options",
     "PlacerecError",
+    "Reading",
     "Recognizer",
     "Selection",
     "Sequence",

@@ -10,6 +10,7 @@ from placerec.baselines.follower import Follower
 from placerec.baselines.lesson import read_lesson
 from placerec.baselines.methods import HOHMM, METHODS, NEED_DESCRIPTORS
 from placerec.errors import ModelError
+from placerec.frames import Reading
 from placerec.hohmm import Beliefs
 from placerec.model import Decoder, Decoding, PlaceModels, load_model, make_recognizer
 from placerec.model import decode as decode_with
@@ -84,7 +85,7 @@ def decode(
     method: str = HOHMM,
     words: Path | str | None = None,
     out: Path | str | None = None,
-    format: str = "auto",
+    reading: Reading = Reading(),
     options: Decoding = PAPER,
     scorer: str = "native",
     as_json: bool = False,
@@ -96,7 +97,7 @@ def decode(
         model,
         words=words,
         out=out,
-        format=format,
+        reading=reading,
         options=options,
         scorer=scorer,
         as_json=as_json,

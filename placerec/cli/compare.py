@@ -1,10 +1,14 @@
 """`placerec compare`."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from placerec.cli.options import PATH, format_option, output_option, progress_bar, talk_options, usage
+from placerec.cli.options import PATH, output_option, progress_bar, reading_options, talk_options, usage
+
+if TYPE_CHECKING:
+    from placerec.frames import Reading
 
 
 @click.command(epilog="Example: placerec compare RUNS/ --test RUNS/run3 --test RUNS/run7 -o out/")
@@ -30,7 +34,7 @@ from placerec.cli.options import PATH, format_option, output_option, progress_ba
     default=None,
     help="Where descriptors, words and models are kept for the next run.  [default: out/cache]",
 )
-@format_option()
+@reading_options()
 @output_option(
     "out/", "The folder to write: methods.csv, pairs.csv, methods.png, beliefs/; a second run goes on there."
 )
@@ -42,7 +46,7 @@ def compare(
     size: int,
     seed: int,
     cache: Path | None,
-    format_: str,
+    reading: "Reading",
     out: Path,
 ) -> None:
     """Run every method on the same test sequences.
@@ -57,6 +61,6 @@ def compare(
     with usage("--methods"):
         chosen = check_methods(None if methods is None else methods.split(","))
     found = run(
-        train, tests, out, methods=chosen, size=size, seed=seed, format=format_, cache=cache, progress=progress_bar
+        train, tests, out, methods=chosen, size=size, seed=seed, reading=reading, cache=cache, progress=progress_bar
     )
     click.echo(format_comparison(found))

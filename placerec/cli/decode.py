@@ -10,16 +10,17 @@ from placerec.cli.options import (
     PATH,
     PATH_OR_STREAM,
     decoding_options,
-    format_option,
     json_option,
     output_option,
     progress_bar,
+    reading_options,
     talk_options,
     usage,
     words_option,
 )
 
 if TYPE_CHECKING:
+    from placerec.frames import Reading
     from placerec.model import Decoding
 
 # What stands in placerec.baselines.METHODS, where reading it would load numpy.
@@ -41,7 +42,7 @@ METHODS = (
 @click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH_OR_STREAM)
 @click.option("-m", "--model", metavar="MODEL/", type=PATH, required=True, help="The folder of train-lm.")
 @words_option(False, "The dictionary, if TOKENS are images.")
-@format_option(" of images")
+@reading_options(" of images")
 @decoding_options("viterbi", "calibrated", "unknown", "explain")
 @click.option("--viterbi", is_flag=True, help="Write the most probable path as best.")
 @click.option("--calibrated", is_flag=True, help="Apply what `placerec calibrate` found to the beliefs.")
@@ -70,7 +71,7 @@ def decode(
     tokens: tuple[Path, ...],
     model: Path,
     words: Path | None,
-    format_: str,
+    reading: "Reading",
     method: str,
     scorer: str,
     as_json: bool,
@@ -114,7 +115,7 @@ def decode(
             method=method,
             words=words,
             out=out,
-            format=format_,
+            reading=reading,
             options=options,
             scorer=scorer,
             as_json=as_json,

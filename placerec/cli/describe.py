@@ -8,6 +8,7 @@ import click
 from placerec.cli.options import descriptor_options, output_option, progress_bar, source_arguments, talk_options
 
 if TYPE_CHECKING:
+    from placerec.frames import Reading
     from placerec.vision import DescriptorSpec
 
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 @output_option("descriptors.npz", "The file to write: arrays descriptors, frames, sequences, places, times.")
 @talk_options
 def describe(
-    sources: tuple[Path, ...], format_: str, spec: "DescriptorSpec | None", matrix: Path | None, out: Path
+    sources: tuple[Path, ...], reading: "Reading", spec: "DescriptorSpec | None", matrix: Path | None, out: Path
 ) -> None:
     """Write the descriptor of every frame.
 
@@ -27,4 +28,4 @@ def describe(
     from placerec.vision import describe_sources
 
     with progress_bar("describe") as progress:
-        describe_sources(sources, out, spec=spec, matrix=matrix, format=format_, progress=progress)
+        describe_sources(sources, out, spec=spec, matrix=matrix, reading=reading, progress=progress)

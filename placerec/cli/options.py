@@ -104,21 +104,32 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def source_arguments(function: Command) -> Command:
-    """SOURCE... and --format: where images come from."""
-    function = format_option()(function)
+    """SOURCE..., and how it is read. The command gets `sources` and `reading`."""
+    function = reading_options()(function)
     return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)(function)
 
 
-def format_option(note: str = "") -> Callable[[Command], Command]:
-    """--format: what a folder of folders of images is."""
-    return click.option(
-        "--format",
-        "format_",
-        type=click.Choice(["auto", "sequences", "places"]),
-        default="auto",
-        show_default=True,
-        help=f"What a folder of folders{note} is: sequences, or one folder per place.",
-    )
+def reading_options(note: str = "") -> Callable[[Command], Command]:
+    """--format: how sources are to be read. The command gets `reading`."""
+
+    def decorated(function: Command) -> Command:
+        @click.option(
+            "--format",
+            "format_",
+            type=click.Choice(["auto", "sequences", "places"]),
+            default="auto",
+            show_default=True,
+            help=f"What a folder of folders{note} is: sequences, or one folder per place.",
+        )
+        @functools.wraps(function)
+        def read(*args: Any, format_: str, **options: Any) -> Any:
+            from placerec.frames.reading import Reading
+
+            return function(*args, reading=Reading(format_), **options)
+
+        return read
+
+    return decorated
 
 
 def descriptor_option(text: str, *kinds: str) -> Callable[[Command], Command]:

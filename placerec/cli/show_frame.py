@@ -2,31 +2,35 @@
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from placerec.cli.options import (
     FILE,
     PATH,
-    format_option,
     json_option,
     output_option,
     progress_bar,
+    reading_options,
     talk_options,
     words_option,
 )
+
+if TYPE_CHECKING:
+    from placerec.frames import Reading
 
 
 @click.command("show-frame", epilog="Example: placerec show-frame frame.png -w words.npz -o seen.png")
 @click.argument("image", metavar="IMAGE", type=FILE)
 @click.argument("sources", metavar="[SOURCE...]", nargs=-1, type=PATH)
-@format_option()
+@reading_options()
 @words_option(True, "The dictionary of train-words.")
 @output_option("seen.png", "Draw what the descriptor sees: .png, .svg or .pdf.", required=False)
 @json_option()
 @talk_options
 def show_frame(
-    image: Path, sources: tuple[Path, ...], format_: str, words: Path, out: Path | None, as_json: bool
+    image: Path, sources: tuple[Path, ...], reading: "Reading", words: Path, out: Path | None, as_json: bool
 ) -> None:
     """Show what the dictionary sees in an image.
 
@@ -38,5 +42,5 @@ def show_frame(
     from placerec.evaluation.look import show_frame as run
 
     with progress_bar("describe") as progress:
-        view = run(image, words, sources, out, format=format_, progress=progress)
+        view = run(image, words, sources, out, reading=reading, progress=progress)
     click.echo(json.dumps(view.to_json(), indent=2, ensure_ascii=False) if as_json else format_frame(view))

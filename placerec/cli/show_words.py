@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -15,6 +16,9 @@ from placerec.cli.options import (
     talk_options,
 )
 
+if TYPE_CHECKING:
+    from placerec.frames import Reading
+
 
 @click.command("show-words", epilog="Example: placerec show-words words.npz RUNS/ -o words.png")
 @click.argument("words", metavar="words.npz", type=FILE)
@@ -26,7 +30,7 @@ from placerec.cli.options import (
 def show_words(
     words: Path,
     sources: tuple[Path, ...],
-    format_: str,
+    reading: "Reading",
     descriptor: tuple[str, Path] | None,
     out: Path | None,
     as_json: bool,
@@ -42,5 +46,5 @@ def show_words(
 
     with progress_bar("describe") as progress:
         matrix = descriptor and descriptor[1]
-        table = run(words, sources, out, matrix=matrix, format=format_, progress=progress)
+        table = run(words, sources, out, matrix=matrix, reading=reading, progress=progress)
     click.echo(json.dumps(table.to_json(), indent=2, ensure_ascii=False) if as_json else format_words(table))

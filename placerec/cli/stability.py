@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,6 +15,9 @@ from placerec.cli.options import (
     words_option,
 )
 
+if TYPE_CHECKING:
+    from placerec.frames import Reading
+
 
 @click.command(epilog="Example: placerec stability RUNS/ -w words.npz -o stability.png")
 @source_arguments
@@ -22,7 +26,9 @@ from placerec.cli.options import (
 @output_option("stability.png", "Draw the table as bars: .png, .svg or .pdf.", required=False)
 @json_option()
 @talk_options
-def stability(sources: tuple[Path, ...], format_: str, words: Path, seed: int, out: Path | None, as_json: bool) -> None:
+def stability(
+    sources: tuple[Path, ...], reading: "Reading", words: Path, seed: int, out: Path | None, as_json: bool
+) -> None:
     """Measure how stable the words are.
 
     SOURCE is what tokenize takes. Every frame is spoilt by JPEG compression, noise, brightness, blur, a shift of one
@@ -33,5 +39,5 @@ def stability(sources: tuple[Path, ...], format_: str, words: Path, seed: int, o
     from placerec.evaluation.word_stability import format_stability
 
     with progress_bar("stability") as progress:
-        found = run(sources, words, out, format=format_, seed=seed, progress=progress)
+        found = run(sources, words, out, reading=reading, seed=seed, progress=progress)
     click.echo(json.dumps(found.to_json(), indent=2) if as_json else format_stability(found))

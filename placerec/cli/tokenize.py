@@ -1,6 +1,7 @@
 """`placerec tokenize`."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,6 +14,9 @@ from placerec.cli.options import (
     words_option,
 )
 
+if TYPE_CHECKING:
+    from placerec.frames import Reading
+
 
 @click.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")
 @source_arguments
@@ -21,7 +25,7 @@ from placerec.cli.options import (
 @output_option("tokens/", "The folder to write: one .tsv per sequence, and vocab.txt.")
 @talk_options
 def tokenize(
-    sources: tuple[Path, ...], format_: str, words: Path, descriptor: tuple[str, Path] | None, out: Path
+    sources: tuple[Path, ...], reading: "Reading", words: Path, descriptor: tuple[str, Path] | None, out: Path
 ) -> None:
     """Write the visual word of every frame.
 
@@ -31,4 +35,4 @@ def tokenize(
     from placerec.words.tokenize import tokenize as run
 
     with progress_bar("tokenize") as progress:
-        run(sources, words, out, matrix=descriptor and descriptor[1], format=format_, progress=progress)
+        run(sources, words, out, matrix=descriptor and descriptor[1], reading=reading, progress=progress)

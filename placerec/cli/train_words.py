@@ -16,6 +16,7 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from placerec.frames import Reading
     from placerec.vision import DescriptorSpec
 
 
@@ -78,7 +79,7 @@ if TYPE_CHECKING:
 @talk_options
 def train_words(
     sources: tuple[Path, ...],
-    format_: str,
+    reading: "Reading",
     size: int,
     components: int,
     seed: int,
@@ -105,7 +106,7 @@ def train_words(
             out,
             spec=spec,
             matrix=matrix,
-            format=format_,
+            reading=reading,
             size=size,
             components=components,
             seed=seed,

@@ -24,8 +24,8 @@ from placerec.evaluation.contest import ALL, CASCADE, Contest, Run, run_method, 
 from placerec.evaluation.material import CENTRIST, GIST, digest, look
 from placerec.evaluation.panels import check_figure
 from placerec.files import held_folder, read_text, whole_folder, write_text
+from placerec.frames import Reading, find_sequences
 from placerec.frames import Sequence as FrameSequence
-from placerec.frames import find_sequences
 from placerec.frames.naming import unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
 from placerec.version import __version__
@@ -47,7 +47,7 @@ def compare(
     methods: Iterable[str] | None = None,
     size: int = SIZE,
     seed: int = 0,
-    format: str = "auto",
+    reading: Reading = Reading(),
     cache: Path | str | None = None,
     progress: ProgressBar = lambda label: nullcontext(lambda done, total: None),
 ) -> Comparison:
@@ -62,7 +62,7 @@ def compare(
     _check_installed(chosen)
     out = Path(out)
     check_figure(out / "methods.png")
-    training, tests = _split(train, test, format)
+    training, tests = _split(train, test, reading)
     _make(out)
     with held_folder(out):
         cache = out / "cache" if cache is None else Path(cache)
@@ -106,12 +106,12 @@ def _check_installed(names: Iterable[str]) -> None:
 
 
 def _split(
-    train: Iterable[Path | str], test: Iterable[Path | str], format: str
+    train: Iterable[Path | str], test: Iterable[Path | str], reading: Reading
 ) -> tuple[list[FrameSequence], list[FrameSequence]]:
     """The sequences to learn from and to test on, under names that are unique among both."""
-    testing = find_sequences(test, format=format)
+    testing = find_sequences(test, reading=reading)
     left_out = {sequence.source.resolve() for sequence in testing}
-    learning = [s for s in find_sequences(train, format=format) if s.source.resolve() not in left_out]
+    learning = [s for s in find_sequences(train, reading=reading) if s.source.resolve() not in left_out]
     if not learning:
         raise EvaluationError("every sequence is a test sequence, and none is left to learn from; name others")
     both = [*learning, *testing]

@@ -12,7 +12,7 @@ from placerec.evaluation.word_sheet import draw_word_sheet
 from placerec.evaluation.word_stability import plot_stability
 from placerec.evaluation.word_table import WordTable, typical_paths, word_table
 from placerec.files import whole_file
-from placerec.frames import find_sequences
+from placerec.frames import Reading, find_sequences
 from placerec.vision import Dictionary, describe
 from placerec.vision.stability import Stability, word_changes
 
@@ -25,7 +25,7 @@ def show_words(
     out: Path | str | None = None,
     *,
     matrix: Path | str | None = None,
-    format: str = "auto",
+    reading: Reading = Reading(),
     progress: Progress | None = None,
 ) -> WordTable:
     """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
@@ -36,7 +36,7 @@ def show_words(
     """
     dictionary = Dictionary.load(words)
     with _picture(out) as picture:
-        table, typical = _looked_up(sources, dictionary, format, progress, matrix)
+        table, typical = _looked_up(sources, dictionary, reading, progress, matrix)
         if picture is not None:
             draw_word_sheet(table, typical, picture, title=f"The words of {Path(words).name}")
     return table
@@ -48,7 +48,7 @@ def show_frame(
     sources: Iterable[Path | str] = (),
     out: Path | str | None = None,
     *,
-    format: str = "auto",
+    reading: Reading = Reading(),
     progress: Progress | None = None,
 ) -> FrameView:
     """`placerec show-frame`: what a words.npz sees in an image, and which units are nearest to it.
@@ -61,7 +61,7 @@ def show_frame(
     with _picture(out) as picture:
         typical: list[Path | None] = [None] * len(view.words)
         if sources := list(sources):
-            table, typical = _looked_up(sources, dictionary, format, progress)
+            table, typical = _looked_up(sources, dictionary, reading, progress)
             view = replace(view, table=table)
         if picture is not None:
             draw_frame_sheet(view, typical, picture)
@@ -73,7 +73,7 @@ def stability(
     words: Path | str,
     out: Path | str | None = None,
     *,
-    format: str = "auto",
+    reading: Reading = Reading(),
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Stability:
@@ -83,7 +83,7 @@ def stability(
     """
     dictionary = Dictionary.load(words)
     with _picture(out) as picture:
-        found = word_changes(find_sequences(sources, format=format), dictionary, seed=seed, progress=progress)
+        found = word_changes(find_sequences(sources, reading=reading), dictionary, seed=seed, progress=progress)
         if picture is not None:
             plot_stability(found, picture)
     return found
@@ -92,12 +92,12 @@ def stability(
 def _looked_up(
     sources: Iterable[Path | str],
     dictionary: Dictionary,
-    format: str,
+    reading: Reading,
     progress: Progress | None,
     matrix: Path | str | None = None,
 ) -> tuple[WordTable, list[Path | None]]:
     """The table of the sources' frames, and the image file of every unit's typical frame."""
-    sequences = find_sequences(sources, format=format)
+    sequences = find_sequences(sources, reading=reading)
     table = word_table(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary)
     return table, typical_paths(table, sequences)
 

@@ -11,11 +11,11 @@ from placerec.frames.cold import CAMERA, LIST_FOLDER, find_list, parse_name
 from placerec.frames.folder import WANTED, list_folder, read_frames
 from placerec.frames.naming import unique_names
 from placerec.frames.places import PlaceList, check_place, check_twins, read_places
+from placerec.frames.reading import Reading
 from placerec.frames.sequence import Sequence
 
 log = logging.getLogger(__name__)
 
-FORMATS = ("auto", "sequences", "places")
 # COLD needs four (COLD/lab/part/sequence); the limit keeps a mistyped source from walking a whole disk.
 MAX_DEPTH = 6
 
@@ -31,18 +31,15 @@ class _Found:
     place: str = ""
 
 
-def find_sequences(sources: Iterable[Path | str], *, format: str = "auto") -> list[Sequence]:
+def find_sequences(sources: Iterable[Path | str], *, reading: Reading = Reading()) -> list[Sequence]:
     """The sequences in `sources`, in the order given, within a source in natural order; no image is opened.
 
     A source is a sequence (COLD's layout, its std_cam/, or a folder of images) or a folder of sequences, searched
-    downwards. `format`: "sequences"; "places" (one folder per place: SOURCE/PLACE/ holds images); or "auto", which
-    takes a folder of unlabelled, unstamped image folders for the latter and says so. Raises SourceError for sources
-    without images, labels that cannot be used, a sequence given twice, names that stay equal with the parent's name.
+    downwards. Raises SourceError for sources without images, labels that cannot be used, a sequence given twice,
+    names that stay equal with the parent's name.
     """
-    if format not in FORMATS:
-        raise SourceError(f"format {format!r} is not known; choose one of {', '.join(FORMATS)}")
     paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
-    found = [item for path in paths for item in _in_source(path, format)]
+    found = [item for path in paths for item in _in_source(path, reading.format)]
     _check_twice(found)
     names = unique_names([(_absolute(item.folder).name, item.folder) for item in found], SourceError)
     labels = [read_places(item.places, frozenset(item.images)) if item.places else None for item in found]

@@ -1,15 +1,23 @@
 """What every source of images is turned into: sequences of frames."""
 
+import collections.abc
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Gray = NDArray[np.uint8] | NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One image of a sequence; nothing of it is decoded until `read_gray(frame.path)`.
+    """One image of a sequence; nothing of it is decoded until it is asked for.
 
-    `name`: the image's file name. `time`: seconds, nan where the source has no time stamps. `place`: "" where
-    unlabelled.
+    `name`: the image's file name, or its number in a recording. `time`: seconds, nan where the source has no time
+    stamps. `place`: "" where unlabelled. `path`: the image file, or the recording that the frame is in.
     """
 
     name: str
@@ -18,10 +26,30 @@ class Frame:
     path: Path
 
 
+class Recording(Protocol):
+    """What holds the images of a sequence that are not files of their own: a video, a bag, a camera.
+
+    `endless`: a camera, whose frames are known only as they come; `Sequence.frames` is empty then.
+    """
+
+    @property
+    def endless(self) -> bool: ...
+
+    def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+        """The frames in order from index `first`, each with its grey levels 0..255 or the reason why it has none."""
+
+    def files(self) -> list[Path]:
+        """The files that it is read from: if none of them changed, neither did a frame."""
+
+
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """One run of a camera: its frames in time order. `source` is the folder that it was read from."""
+    """One run of a camera: its frames in time order.
+
+    `source`: the folder or file that it was read from. `recording`: None if every frame is an image file of its own.
+    """
 
     name: str
-    frames: tuple[Frame, ...]
+    frames: collections.abc.Sequence[Frame]
     source: Path
+    recording: Recording | None = None

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
+from placerec.frames import Reading
 from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, format_row
 from placerec.hohmm.beliefs import UNKNOWN
 from placerec.hohmm.explain import EXPLAINED, explain_stream
@@ -29,7 +30,7 @@ def decode(
     *,
     words: Path | str | None = None,
     out: Path | str | None = None,
-    format: str = "auto",
+    reading: Reading = Reading(),
     options: Decoding = PAPER,
     scorer: str = "native",
     as_json: bool = False,
@@ -38,7 +39,7 @@ def decode(
 ) -> list[Beliefs]:
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
-    `sources`: token streams, or image sources (of `format`) if `words` (a words.npz) is given. Without `out` there must
+    `sources`: token streams, or image sources (`reading`) if `words` (a words.npz) is given. Without `out` there must
     be one sequence only; explanations are written there, as NAME.explain.jsonl. `make`: what gives the decoder, for
     the arguments of `make_recognizer`. Raises ModelError or StreamError for what cannot be read or does not belong
     together.
@@ -46,14 +47,14 @@ def decode(
     if out is None:
         if options.explain:
             raise ModelError("explanations are files: name a folder for them with -o")
-        _, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress, make)
+        _, recognizer, streams = _opened(sources, model, words, reading, options, scorer, progress, make)
         if len(streams) > 1:
             raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
         return [_decoded(recognizer, stream, options) for stream in streams]
     _spare_sources(sources, Path(out))
     found = []
     with whole_folder(Path(out), OWNED) as folder:
-        models, recognizer, streams = _opened(sources, model, words, format, options, scorer, progress, make)
+        models, recognizer, streams = _opened(sources, model, words, reading, options, scorer, progress, make)
         for stream in streams:
             beliefs = _decoded(recognizer, stream, options)
             suffix = "jsonl" if as_json else "tsv"
@@ -71,7 +72,7 @@ def _opened(
     sources: Sequence[Path | str],
     model: Path | str,
     words: Path | str | None,
-    format: str,
+    reading: Reading,
     options: Decoding,
     scorer: str,
     progress: Progress | None,
@@ -79,7 +80,7 @@ def _opened(
 ) -> tuple[PlaceModels, Decoder, list[WordStream]]:
     models = load_model(model)
     if words is not None:
-        return models, *_image_streams(sources, Path(words), models, format, options, scorer, progress, make)
+        return models, *_image_streams(sources, Path(words), models, reading, options, scorer, progress, make)
     return models, make(models, options=options, scorer=scorer), token_streams(sources, models)
 
 
@@ -92,7 +93,7 @@ def _image_streams(
     sources: Sequence[Path | str],
     words: Path,
     models: PlaceModels,
-    format: str,
+    reading: Reading,
     options: Decoding,
     scorer: str,
     progress: Progress | None,
@@ -107,7 +108,7 @@ def _image_streams(
             raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
     dictionary = Dictionary.load(words)
     recognizer = make(models, options=options, scorer=scorer, dictionary=dictionary)
-    return recognizer, streams_of(sources, dictionary, format=format, progress=progress)
+    return recognizer, streams_of(sources, dictionary, reading=reading, progress=progress)
 
 
 def _spare_sources(sources: Sequence[Path | str], out: Path) -> None:

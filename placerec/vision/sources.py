@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from placerec.files import whole_file
-from placerec.frames import find_sequences
+from placerec.frames import Reading, find_sequences
 from placerec.vision.describe import Progress, describe, save_descriptors
 from placerec.vision.dictionary import Dictionary, Quality
 from placerec.vision.quality import MapQuality
@@ -21,7 +21,7 @@ def describe_sources(
     *,
     spec: DescriptorSpec | None = None,
     matrix: Path | str | None = None,
-    format: str = "auto",
+    reading: Reading = Reading(),
     progress: Progress | None = None,
 ) -> None:
     """Write the descriptors of all frames of the sources to `out`; `progress` is called with frames done and in all.
@@ -32,7 +32,7 @@ def describe_sources(
     # The file comes first: that it cannot be written must not be found out after an hour of images.
     with whole_file(Path(out)) as partial:
         save_descriptors(
-            describe(find_sequences(sources, format=format), spec, matrix=matrix, progress=progress), partial
+            describe(find_sequences(sources, reading=reading), spec, matrix=matrix, progress=progress), partial
         )
 
 
@@ -42,7 +42,7 @@ def train_dictionary(
     *,
     spec: DescriptorSpec | None = None,
     matrix: Path | str | None = None,
-    format: str = "auto",
+    reading: Reading = Reading(),
     size: int = 10,
     components: int = 80,
     seed: int = 0,
@@ -61,7 +61,7 @@ def train_dictionary(
     `describe_sources` and `Dictionary.fit` do.
     """
     with whole_file(Path(out)) as partial:
-        training, others = find_sequences(sources, format=format), find_sequences(held_out, format=format)
+        training, others = find_sequences(sources, reading=reading), find_sequences(held_out, reading=reading)
         seen, unseen = (sum(len(sequence.frames) for sequence in some) for some in (training, others))
         tell = progress or (lambda done, total: None)
         described = describe(training, spec, matrix=matrix, progress=lambda done, _: tell(done, seen + unseen))

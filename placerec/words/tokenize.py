@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from placerec.files import whole_folder, write_text
-from placerec.frames import find_sequences
+from placerec.frames import Reading, find_sequences
 from placerec.version import __version__
 from placerec.vision import Descriptors, Dictionary, describe
 from placerec.words.stream import WordStream, write_stream, write_vocabulary
@@ -21,7 +21,7 @@ def tokenize(
     out: Path | str,
     *,
     matrix: Path | str | None = None,
-    format: str = "auto",
+    reading: Reading = Reading(),
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """`placerec tokenize`: write the tokens folder `out` (one .tsv per sequence, vocab.txt) of image sources.
@@ -32,7 +32,7 @@ def tokenize(
     dictionary = Dictionary.load(Path(words))
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
     with whole_folder(Path(out), OWNED) as folder:
-        streams = streams_of(sources, dictionary, matrix=matrix, format=format, progress=progress)
+        streams = streams_of(sources, dictionary, matrix=matrix, reading=reading, progress=progress)
         _write(streams, dictionary, folder)
     seen = len({word for stream in streams for word in stream.words})
     log.info("%s: %d sequences, %d of %d words seen", out, len(streams), seen, len(dictionary.vocabulary))
@@ -43,14 +43,14 @@ def streams_of(
     dictionary: Dictionary,
     *,
     matrix: Path | str | None = None,
-    format: str = "auto",
+    reading: Reading = Reading(),
     progress: Callable[[int, int], None] | None = None,
 ) -> list[WordStream]:
     """The token streams of image sources: each frame's best-matching unit in `dictionary`.
 
     `matrix`: as for `tokenize`. Raises VisionError for a dictionary that needs one if there is none.
     """
-    sequences = find_sequences(sources, format=format)
+    sequences = find_sequences(sources, reading=reading)
     streams = tokens_of(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary)
     for name in sorted({sequence.name for sequence in sequences} - {stream.name for stream in streams}):
         log.warning("%s: none of its images can be read; the sequence is left out", name)
