@@ -39,13 +39,26 @@ def whole_file(path: Path) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(prefix=PARTIAL.format(target.name), suffix=target.suffix, dir=target.parent)
         os.close(handle)
     partial = Path(name)
+    lock = _lock(partial)
     try:
         with _writing(path):
             yield partial
             partial.chmod(0o666 & ~_umask())
             partial.replace(target)
     finally:
+        _unlock(lock)
         partial.unlink(missing_ok=True)
+
+
+def sweep_files(path: Path) -> None:
+    """Remove what killed runs of `whole_file` left beside `path`; what a run is writing now stays."""
+    start = PARTIAL.format(path.name)
+    for entry in path.parent.iterdir():
+        if entry.name.startswith(start) and entry.suffix == path.suffix and entry.is_file():
+            lock = _lock(entry)
+            if lock is not None:
+                entry.unlink(missing_ok=True)
+                _unlock(lock)
 
 
 @contextmanager
@@ -109,14 +122,19 @@ def held_folder(path: Path) -> Iterator[None]:
 
 def write_text(path: Path, text: str) -> None:
     """Write `text` as UTF-8 with LF line ends, gzipped if `path` ends in .gz; whole or not at all."""
-    try:
-        data = text.encode()
-    except UnicodeEncodeError as error:
-        around = text[max(0, error.start - 20) : error.end + 20]
-        raise OutputError(f"{path}: a name in {around!r} is not UTF-8, and cannot be written; rename it") from error
+    data = encoded(path, text)
     with whole_file(path) as partial:
         # mtime=0: the same text gives the same bytes.
         partial.write_bytes(gzip.compress(data, mtime=0) if partial.suffix == ".gz" else data)
+
+
+def encoded(path: Path, text: str) -> bytes:
+    """`text` as UTF-8; OutputError for what is not text in any encoding, as names of files can be."""
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        around = text[max(0, error.start - 20) : error.end + 20]
+        raise OutputError(f"{path}: a name in {around!r} is not UTF-8, and cannot be written; rename it") from error
 
 
 def read_text(path: Path, error: type[PlacerecError]) -> str:

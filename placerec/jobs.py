@@ -1,15 +1,17 @@
-"""Work in several processes: one `map_jobs` for serial and parallel work, with the same results and the same notes."""
+"""Work in several threads or processes: the same results in the same order, and the same notes."""
 
 import logging
 import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
-from typing import TypeVar
+from itertools import chain, islice
+from typing import Any, Protocol, TypeVar
 
 from placerec.errors import PlacerecError
 
@@ -18,58 +20,101 @@ R = TypeVar("R")
 Progress = Callable[[int, int], None]
 log = logging.getLogger("placerec")
 
+# For fewer items than this, starting processes takes longer than they save.
+FEW = 5
+
+
+class JobError(PlacerecError):
+    """A process of the work came to its end before the work did."""
+
+
+class Map(Protocol):
+    """Like the built-in `map` of one iterable: lazy, the results in the order of the items."""
+
+    def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]: ...
+
 
 def processors() -> int:
     """How many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def workers(jobs: int | None = None) -> Map:
+    """What maps a function in `jobs` processes; 1: in this one; None: in threads of this one, one a processor.
+
+    Functions and items of processes must be importable and picklable; the function goes to each process once, and what
+    it logs is logged here, in the order of the items. Only some items ahead of the results are asked for. An
+    exception ends the work and is raised; JobError if a process is killed, for instance for want of memory. Processes
+    begin by importing the program's main module: it needs `if __name__ == "__main__":`.
+    """
+    if jobs is None:
+        return _threads
+    return map if jobs <= 1 else partial(_processes, jobs)
+
+
 def map_jobs(
     function: Callable[[T], R], items: Sequence[T], *, jobs: int = 1, progress: Progress | None = None
 ) -> list[R]:
-    """`function` of every item, in order, in `jobs` processes (1: in this one).
-
-    `function` and items must be importable and picklable. What it logs is logged here, in the order of the items. An
-    exception ends all work and is raised; PlacerecError if a process is killed, for instance for want of memory.
-    `progress` is called with items done and in all.
-    """
-    tell = progress or (lambda done, total: None)
-    if jobs <= 1 or len(items) <= 1:
-        return list(_serial(function, items, tell))
-    with _Workers(min(jobs, len(items))) as pool:
-        waiting = [pool.submit(partial(_recorded, function, log.getEffectiveLevel()), item) for item in items]
-        try:
-            for done, future in enumerate(as_completed(waiting), start=1):
-                future.result()
-                tell(done, len(items))
-        except BrokenProcessPool as error:
-            raise PlacerecError("a process of the work was killed; give it more memory, or fewer jobs") from error
-        finally:
-            pool.shutdown(cancel_futures=True)
+    """`function` of every item, in order, by `workers(jobs)`; `progress` is called with items done and in all."""
     results = []
-    for future in waiting:
-        result, records = future.result()
-        for record in records:
-            log.handle(record)
+    for result in _processes(jobs, function, items, few=2) if jobs > 1 else map(function, items):
         results.append(result)
+        if progress:
+            progress(len(results), len(items))
     return results
 
 
-def _serial(function: Callable[[T], R], items: Sequence[T], tell: Progress) -> Iterator[R]:
-    for done, item in enumerate(items, start=1):
-        yield function(item)
-        tell(done, len(items))
+def _threads(function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
+    count = processors()
+    with ThreadPoolExecutor(count) as pool:
+        yield from _ahead(pool, lambda item: pool.submit(function, item), items, 2 * count)
+
+
+def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few: int = FEW) -> Iterator[R]:
+    rest = iter(items)
+    first = list(islice(rest, few))
+    if len(first) < few:
+        yield from (_threads if few > 2 else map)(function, first)
+        return
+    call = partial(_call, log.getEffectiveLevel())
+    with _Workers(jobs, function) as pool:
+        try:
+            for result, records in _ahead(pool, lambda item: pool.submit(call, item), chain(first, rest), 4 * jobs):
+                for record in records:
+                    log.handle(record)
+                yield result
+        except BrokenProcessPool as error:
+            raise JobError("a process of the work was killed; give it more memory, or fewer jobs") from error
+
+
+def _ahead(pool: Executor, submit: Callable[[T], Future[R]], items: Iterable[T], window: int) -> Iterator[R]:
+    waiting: deque[Future[R]] = deque()
+    try:
+        for item in items:
+            waiting.append(submit(item))
+            if len(waiting) > window:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 class _Workers(ProcessPoolExecutor):
     """Processes that begin empty, so that no thread or lock of this one is copied half-way."""
 
-    def __init__(self, jobs: int) -> None:
-        super().__init__(jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
+    def __init__(self, jobs: int, function: Callable[..., Any]) -> None:
+        spawn = multiprocessing.get_context("spawn")
+        super().__init__(jobs, mp_context=spawn, initializer=_begin, initargs=(function,))
 
 
-def _begin() -> None:
+_function: Callable[..., Any]
+
+
+def _begin(function: Callable[..., Any]) -> None:
     """What a worker does first: it is to end with its parent, however that ends, and without a word."""
+    global _function
+    _function = function
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -93,12 +138,13 @@ class _Notes(logging.Handler):
         self.records.append(record)
 
 
-def _recorded(function: Callable[[T], R], level: int, item: T) -> tuple[R, list[logging.LogRecord]]:
+def _call(level: int, item: Any) -> tuple[Any, list[logging.LogRecord]]:
+    """In a worker: its function of the item, and what that logged."""
     notes = _Notes()
     log.setLevel(level)
     log.propagate = False
     log.addHandler(notes)
     try:
-        return function(item), notes.records
+        return _function(item), notes.records
     finally:
         log.removeHandler(notes)

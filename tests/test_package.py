@@ -13,7 +13,7 @@ PACKAGE = Path(placerec.__file__).parent
 HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm", "sklearn")
 # A room imports only from rooms to its left, and these anyone may import.
 LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "experiments", "demo", "cli")
-COMMON = {"errors", "files", "jobs", "version"}
+COMMON = {"errors", "files", "jobs", "journal", "version"}
 ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     # A toolkit for text alone.
     "lm": COMMON | {"lm"},
@@ -24,6 +24,7 @@ ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     "cli": COMMON | set(LINE) | {"lab", "srilm"},
     "files": {"errors"},
     "jobs": {"errors"},
+    "journal": {"errors", "files", "jobs"},
     "errors": set(),
     "version": set(),
     "reference": set(),

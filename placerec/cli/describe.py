@@ -5,10 +5,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from placerec.cli.options import descriptor_options, output_option, progress_bar, source_arguments, talk_options
+from placerec.cli.options import (
+    descriptor_options,
+    output_option,
+    progress_bar,
+    source_arguments,
+    talk_options,
+    work_options,
+)
 
 if TYPE_CHECKING:
     from placerec.frames import Reading
+    from placerec.jobs import Map
     from placerec.vision import DescriptorSpec
 
 
@@ -16,9 +24,15 @@ if TYPE_CHECKING:
 @source_arguments
 @descriptor_options
 @output_option("descriptors.npz", "The file to write: arrays descriptors, frames, sequences, places, times.")
+@work_options
 @talk_options
 def describe(
-    sources: tuple[Path, ...], reading: "Reading", spec: "DescriptorSpec | None", matrix: Path | None, out: Path
+    sources: tuple[Path, ...],
+    reading: "Reading",
+    spec: "DescriptorSpec | None",
+    matrix: Path | None,
+    out: Path,
+    work: "Map",
 ) -> None:
     """Write the descriptor of every frame.
 
@@ -28,4 +42,4 @@ def describe(
     from placerec.vision import describe_sources
 
     with progress_bar("describe") as progress:
-        describe_sources(sources, out, spec=spec, matrix=matrix, reading=reading, progress=progress)
+        describe_sources(sources, out, spec=spec, matrix=matrix, reading=reading, work=work, progress=progress)

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import click
 
-from placerec.cli.options import FILE, log, output_option, progress_bar, talk_options
+from placerec.cli.options import FILE, jobs_option, log, output_option, progress_bar, talk_options
 
 
 @click.command(epilog="Example: placerec experiment grid.toml -o results/")
 @click.argument("config", metavar="CONFIG.toml", type=FILE)
 @output_option("results/", "The folder to write; what it holds from before is used again.")
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes to use.  [default: one a processor]")
+@jobs_option
 @talk_options
 def experiment(config: Path, out: Path, jobs: int | None) -> None:
     """Run the paper's grid of experiments, or another.

@@ -1,9 +1,11 @@
 """Options that several commands share: one spelling, one meaning."""
 
 import functools
+import itertools
 import logging
 import math
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -86,12 +88,24 @@ def usage(option: str) -> Iterator[None]:
 def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """A callback(done, total) that draws a bar on stderr while it is a terminal and nobody asked for quiet."""
     bars: list[Any] = []
+    began = time.monotonic()
 
     def show(done: int, total: int) -> None:
         if not bars:
-            bars.append(click.progressbar(length=total, label=label, file=sys.stderr, show_pos=True, show_eta=True))
+            bars.append(
+                click.progressbar(
+                    # A camera has no end.
+                    itertools.count(),
+                    length=total or None,
+                    label=label,
+                    file=sys.stderr,
+                    show_pos=True,
+                    show_eta=True,
+                    item_show_func=lambda rate: None if rate is None else f"{rate:.3g}/s",
+                )
+            )
             bars[0].__enter__()
-        bars[0].update(done - bars[0].pos)
+        bars[0].update(done - bars[0].pos, done / max(time.monotonic() - began, 1e-3))
 
     if sys.stderr is None or not sys.stderr.isatty() or not log.isEnabledFor(logging.INFO):
         yield lambda done, total: None
@@ -107,6 +121,25 @@ def source_arguments(function: Command) -> Command:
     """SOURCE..., and how it is read. The command gets `sources` and `reading`."""
     function = reading_options()(function)
     return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)(function)
+
+
+def jobs_option(function: Command) -> Command:
+    """--jobs: how many processes."""
+    text = "Processes that share the work; the output is the same for any number.  [default: one a processor]"
+    return click.option("-j", "--jobs", metavar="N", type=click.IntRange(min=1), help=text)(function)
+
+
+def work_options(function: Command) -> Command:
+    """--jobs: what does the work. The command gets `work`."""
+
+    @jobs_option
+    @functools.wraps(function)
+    def working(*args: Any, jobs: int | None, **options: Any) -> Any:
+        from placerec.jobs import processors, workers
+
+        return function(*args, work=workers(jobs or processors()), **options)
+
+    return working
 
 
 def reading_options(note: str = "") -> Callable[[Command], Command]:

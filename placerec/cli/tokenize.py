@@ -12,10 +12,12 @@ from placerec.cli.options import (
     source_arguments,
     talk_options,
     words_option,
+    work_options,
 )
 
 if TYPE_CHECKING:
     from placerec.frames import Reading
+    from placerec.jobs import Map
 
 
 @click.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")
@@ -23,9 +25,15 @@ if TYPE_CHECKING:
 @words_option(True, "The dictionary of train-words.")
 @descriptor_option("The frames' descriptors, if those of the dictionary were computed elsewhere.")
 @output_option("tokens/", "The folder to write: one .tsv per sequence, and vocab.txt.")
+@work_options
 @talk_options
 def tokenize(
-    sources: tuple[Path, ...], reading: "Reading", words: Path, descriptor: tuple[str, Path] | None, out: Path
+    sources: tuple[Path, ...],
+    reading: "Reading",
+    words: Path,
+    descriptor: tuple[str, Path] | None,
+    out: Path,
+    work: "Map",
 ) -> None:
     """Write the visual word of every frame.
 
@@ -35,4 +43,4 @@ def tokenize(
     from placerec.words.tokenize import tokenize as run
 
     with progress_bar("tokenize") as progress:
-        run(sources, words, out, matrix=descriptor and descriptor[1], reading=reading, progress=progress)
+        run(sources, words, out, matrix=descriptor and descriptor[1], reading=reading, work=work, progress=progress)

@@ -13,10 +13,12 @@ from placerec.cli.options import (
     progress_bar,
     source_arguments,
     talk_options,
+    work_options,
 )
 
 if TYPE_CHECKING:
     from placerec.frames import Reading
+    from placerec.jobs import Map
     from placerec.vision import DescriptorSpec
 
 
@@ -76,6 +78,7 @@ if TYPE_CHECKING:
 )
 @descriptor_options
 @output_option("words.npz", "The dictionary to write.")
+@work_options
 @talk_options
 def train_words(
     sources: tuple[Path, ...],
@@ -92,6 +95,7 @@ def train_words(
     spec: "DescriptorSpec | None",
     matrix: Path | None,
     out: Path,
+    work: "Map",
 ) -> None:
     """Learn visual words: PCA and a map of descriptors.
 
@@ -107,6 +111,7 @@ def train_words(
             spec=spec,
             matrix=matrix,
             reading=reading,
+            work=work,
             size=size,
             components=components,
             seed=seed,

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from placerec.evaluation.summary import percent, shorten
 from placerec.evaluation.word_table import WordTable
 from placerec.frames import read_gray
+from placerec.frames.sequence import Gray
 from placerec.vision import DescriptorSpec, Dictionary, descriptor, fit_image
-from placerec.vision.images import Gray
 from placerec.vision.pca import project
 
 NEAREST = 5

@@ -16,8 +16,8 @@ from placerec.experiments import cache
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import find_sequences
 from placerec.frames.folder import natural_key
+from placerec.jobs import Map, Progress
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe
-from placerec.vision.describe import Progress
 from placerec.vision.storage import read_npz, write_npz
 from placerec.words.tokenize import tokens_of, write_tokens
 
@@ -66,7 +66,7 @@ def find_images(globs: Sequence[str], folder: Path) -> list[FrameSequence]:
 
 
 def describe_all(
-    sequences: Sequence[FrameSequence], folder: Path, *, workers: int, progress: Progress | None = None
+    sequences: Sequence[FrameSequence], folder: Path, *, work: Map | None = None, progress: Progress | None = None
 ) -> list[Described]:
     """Describe every frame, or know it again; one file per sequence in `folder`, which may be used again at once."""
     described = []
@@ -75,7 +75,7 @@ def describe_all(
         key = cache.key_of("descriptors", SPEC.as_dict(), [cache.content_of(frame.path) for frame in sequence.frames])
         one = Described(sequence, folder / f"{key}.npz")
         if not _usable(one):
-            _describe(one, workers, progress and _shifted(progress, done, total))
+            _describe(one, work, progress and _shifted(progress, done, total))
         done += len(sequence.frames)
         if progress:
             progress(done, total)
@@ -95,10 +95,10 @@ def _usable(one: Described) -> bool:
     return True
 
 
-def _describe(one: Described, workers: int, progress: Progress | None) -> None:
+def _describe(one: Described, work: Map | None, progress: Progress | None) -> None:
     # Equal names in one folder cannot be.
     row = {frame.name: number for number, frame in enumerate(one.sequence.frames)}
-    found = describe([one.sequence], SPEC, workers=workers, progress=progress)
+    found = describe([one.sequence], SPEC, work=work, progress=progress)
     rows = np.array([row[name] for name in found.frames], np.int64)
     write_npz(one.kept, {"descriptors": found.values, "rows": rows}, {"constant": found.constant})
 

@@ -12,7 +12,7 @@ from placerec.experiments.cells import Cell, CellJob
 from placerec.experiments.config import Config
 from placerec.experiments.splits import SPLITS, Fold, named_tests
 from placerec.experiments.tokens import TokensJob, describe_all, find_images, make_tokens
-from placerec.jobs import map_jobs
+from placerec.jobs import map_jobs, workers
 from placerec.model.corpus import VOCABULARY, stream_files
 
 ProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
@@ -38,7 +38,7 @@ def _image_units(plan: Config, out: Path, jobs: int, progress: ProgressBar) -> I
     sequences = find_images(plan.sequences, plan.folder)
     folds = _folds(plan, [sequence.name for sequence in sequences])
     with progress("describe") as show:
-        described = describe_all(sequences, out / "cache" / "descriptors", workers=jobs, progress=show)
+        described = describe_all(sequences, out / "cache" / "descriptors", work=workers(jobs), progress=show)
     of = {one.sequence.name: one for one in described}
     todo = {}
     for size, seed, fold in product(plan.size, range(plan.seeds), folds):

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Gray = NDArray[np.uint8] | NDArray[np.float32]
+Gray = NDArray[np.uint8 | np.float32]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,8 @@
 """Matrices that come in pieces: what is computed from them does not depend on how they were cut."""
 
+import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ Stream = Callable[[], Iterator[Rows]]  # called once for every pass: gives all r
 Source = Rows | Stream  # (n, d) in memory or memory-mapped, or streamed
 
 CHUNK = TERMS  # no more, or the sums of the PCA would round
+IN_MEMORY = 1 << 26  # bytes
 
 
 def chunks(source: Source) -> Iterator[Rows]:
@@ -33,6 +36,23 @@ def chunks(source: Source) -> Iterator[Rows]:
             waiting, count = [together[whole:]], count - whole
     if count:
         yield np.concatenate(waiting)
+
+
+@contextmanager
+def stored(source: Source) -> Iterator[Stream]:
+    """The rows of a source, kept for any number of passes: in memory up to IN_MEMORY, beyond in a nameless file."""
+    width = 0
+    with tempfile.SpooledTemporaryFile(IN_MEMORY) as file:
+        for rows in chunks(source):
+            file.write(rows.astype(np.float32, copy=False).tobytes())
+            width = rows.shape[1]
+
+        def pieces() -> Iterator[Rows]:
+            file.seek(0)
+            while data := file.read(4 * width * CHUNK):
+                yield np.frombuffer(data, np.float32).reshape(-1, width)
+
+        yield pieces
 
 
 def again(source: Source, n: int) -> Iterator[Rows]:

@@ -1,26 +1,26 @@
 """Sequences -> descriptors: every frame is read, described and forgotten."""
 
 import logging
-import os
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import SourceError, VisionError
-from placerec.frames import Frame, Sequence, read_gray
+from placerec.errors import VisionError
+from placerec.frames import Frame, Sequence
+from placerec.jobs import Map, Progress
+from placerec.journal import Journal
 from placerec.vision.external import read_rows
 from placerec.vision.gist import Floats
-from placerec.vision.spec import DescriptorSpec, check_describes_images, descriptor
-from placerec.vision.storage import write_npz
+from placerec.vision.spec import DescriptorSpec, check_describes_images
+from placerec.vision.storage import Pieces, write_npz
+from placerec.vision.work import Answer, Tally, answers, describe_batch
 
 log = logging.getLogger(__name__)
-
-Progress = Callable[[int, int], None]  # frames done, frames in all
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,44 +54,93 @@ def describe(
     spec: DescriptorSpec | None = None,
     *,
     matrix: Path | str | None = None,
-    workers: int | None = None,
+    work: Map | None = None,
     progress: Progress | None = None,
 ) -> Descriptors:
     """The descriptor of every frame; an image that cannot be read is skipped, counted and named in a warning.
 
     `spec`: None is the default one, or what `matrix` holds. `matrix`: a .npy or .npz file of descriptors that were
-    computed elsewhere (`external.read_rows`); no image is read then. `workers`: threads that read and describe, None
-    for one a processor; the result is the same for any number. Raises VisionError if no image can be read, or if the
-    matrix cannot be used or holds other descriptors than `spec` wants.
+    computed elsewhere (`external.read_rows`); no image is read then. `work`: who does the work (`jobs.workers`), None
+    for threads; the result is the same with any. `progress` is called with frames done and in all. Raises VisionError
+    if no image can be read, or if the matrix cannot be used or holds other descriptors than `spec` wants.
     """
-    named = [(sequence.name, frame) for sequence in sequences for frame in sequence.frames]
+    sequences, listing = list(sequences), Listing()
     if matrix is not None:
-        spec, values, kept = _given(named, spec, Path(matrix))
-        constant = 0
+        spec, values = _given(sequences, spec, Path(matrix), listing)
     else:
         spec = spec or DescriptorSpec()
-        check_describes_images(spec)
-        values, kept, constant = _made(named, spec, workers, progress)
-    skipped = len(named) - len(kept)
-    pictures = f", {constant} of one grey level throughout" if matrix is None else f"; rows of {matrix}"
-    log.info("%d frames described, %d skipped%s", len(kept), skipped, pictures)
-    found = [named[k] for k in kept]
-    return Descriptors(
-        spec,
-        values,
-        tuple(frame.name for _, frame in found),
-        tuple(sequence for sequence, _ in found),
-        np.array([frame.time for _, frame in found], np.float64),
-        tuple(frame.place for _, frame in found),
-        skipped,
-        constant,
-    )
+        values = np.concatenate(list(described(sequences, spec, listing, work=work, progress=progress)))
+    return Descriptors(spec, values, *listing.columns(), listing.tally.skipped, listing.tally.constant)
+
+
+@dataclass
+class Listing:
+    """The frames that have a descriptor, as they are found."""
+
+    frames: list[str] = field(default_factory=list)
+    sequences: list[str] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
+    places: list[str] = field(default_factory=list)
+    tally: Tally = field(default_factory=Tally)
+
+    def add(self, sequence: str, frame: Frame) -> None:
+        """One frame more."""
+        self.frames.append(frame.name)
+        self.sequences.append(sequence)
+        self.times.append(frame.time)
+        self.places.append(frame.place)
+
+    def columns(self) -> tuple[tuple[str, ...], tuple[str, ...], NDArray[np.float64], tuple[str, ...]]:
+        """Frames, sequences, times and places, as `Descriptors` has them."""
+        return tuple(self.frames), tuple(self.sequences), np.array(self.times, np.float64), tuple(self.places)
+
+
+def described(
+    sequences: list[Sequence],
+    spec: DescriptorSpec,
+    listing: Listing,
+    *,
+    work: Map | None = None,
+    journal: Journal | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Floats]:
+    """The descriptors (m, spec.length) of a batch of frames after the other, which are listed; else as `describe`."""
+    check_describes_images(spec)
+    function, tally = partial(describe_batch, spec), listing.tally
+    for batch, answer in answers(
+        function, sequences, spec, tally, key="describe", work=work, journal=journal, progress=progress
+    ):
+        for k in answer.kept.tolist():
+            listing.add(batch.sequence, batch.frames[k])
+        yield answer.arrays["values"]
+    tally.close()
+
+
+def list_described(
+    sequences: list[Sequence],
+    spec: DescriptorSpec,
+    journal: Journal,
+    work: Map | None = None,
+    progress: Progress | None = None,
+) -> Listing:
+    """The frames that have a descriptor; the descriptors are left in the journal, for `kept_rows`."""
+    listing = Listing()
+    for _ in described(sequences, spec, listing, work=work, journal=journal, progress=progress):
+        pass
+    return listing
+
+
+def kept_rows(journal: Journal) -> Iterator[Floats]:
+    """The descriptors that `described` left in a journal, batch by batch."""
+    for content in journal.contents():
+        yield Answer.unpack(content).arrays["values"]
 
 
 def _given(
-    named: list[tuple[str, Frame]], spec: DescriptorSpec | None, matrix: Path
-) -> tuple[DescriptorSpec, Floats, list[int]]:
-    """The specification and the rows of a matrix, and the indices of the frames that these are of."""
+    sequences: list[Sequence], spec: DescriptorSpec | None, matrix: Path, listing: Listing
+) -> tuple[DescriptorSpec, Floats]:
+    """The specification and the rows of a matrix; the frames that have one are listed."""
+    named = [(sequence.name, frame) for sequence in sequences for frame in sequence.frames]
     if spec is not None and spec.kind != "npy":
         raise VisionError(f"{matrix}: is not wanted, for the dictionary is of {spec.kind} descriptors; leave it out")
     values, kept = read_rows(matrix, [(sequence, frame.name) for sequence, frame in named])
@@ -101,74 +150,41 @@ def _given(
         raise VisionError(f"{matrix}: has rows of {values.shape[1]} values, and the dictionary's have {spec.columns}")
     for k in sorted(set(range(len(named))) - set(kept)):
         log.warning("%s: has no row for %s; the frame is skipped", matrix, named[k][1].path)
-    return spec or DescriptorSpec(kind="npy", columns=values.shape[1]), values, kept
-
-
-def _made(
-    named: list[tuple[str, Frame]], spec: DescriptorSpec, workers: int | None, progress: Progress | None
-) -> tuple[Floats, list[int], int]:
-    """The descriptors of images, the indices of the frames that they are of, and how many images are constant."""
-    results = []
-    for done, result in enumerate(_described([frame.path for _, frame in named], spec, workers), start=1):
-        results.append(result)
-        if progress is not None:
-            progress(done, len(named))
-    rows, kept = [], []
-    for k, result in enumerate(results):
-        if isinstance(result, str):
-            log.warning("%s; the frame is skipped", result)
-        else:
-            rows.append(result)
-            kept.append(k)
-    if not kept:
-        raise VisionError(f"none of the {len(named)} images can be read; name a folder with images")
-    constant = [k for k, row in zip(kept, rows, strict=True) if not row.any()]
-    if constant:
-        log.warning("%s: of one grey level throughout; its descriptor is zero", named[constant[0]][1].path)
-    return np.stack(rows), kept, len(constant)
-
-
-def _described(paths: Iterable[Path], spec: DescriptorSpec, workers: int | None) -> Iterator[Floats | str]:
-    """`describe_image` of every path, in order; no more images are in memory than the workers can use."""
-    workers = _processors() if workers is None else workers
-    waiting: deque[Future[Floats | str]] = deque()
-    # Threads are enough: decoding, the transforms and numpy's loops all run without the interpreter's lock.
-    with ThreadPoolExecutor(workers) as pool:
-        for path in paths:
-            waiting.append(pool.submit(describe_image, path, spec))
-            if len(waiting) > 4 * workers:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
-
-
-def _processors() -> int:
-    # Of those that this process may run on, where the system can tell.
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def describe_image(path: Path, spec: DescriptorSpec) -> Floats | str:
-    """One image file's descriptor, or the reason why there is none: a function of its arguments alone.
-
-    That it gives back what went wrong lets a pool of workers map it over the frames.
-    """
-    try:
-        return descriptor(read_gray(path), spec)
-    except SourceError as error:
-        return str(error)
-    except VisionError as error:
-        return f"{path}: {error}"
+    for k in kept:
+        listing.add(*named[k])
+    listing.tally = Tally(len(named), len(named) - len(kept))
+    log.info("%d frames described, %d skipped; rows of %s", len(kept), listing.tally.skipped, matrix)
+    return spec or DescriptorSpec(kind="npy", columns=values.shape[1]), values
 
 
 def save_descriptors(descriptors: Descriptors, path: Path | str) -> None:
     """Write descriptors.npz: `descriptors` (n, d) float32, `frames`, `sequences`, `times`, `places` and JSON `meta`."""
-    arrays = {
-        "descriptors": descriptors.values,
-        "frames": np.array(descriptors.frames, np.str_),
-        "sequences": np.array(descriptors.sequences, np.str_),
-        "times": descriptors.times,
-        "places": np.array(descriptors.places, np.str_),
+    given = descriptors
+    columns = given.frames, given.sequences, given.times, given.places
+    _save(path, given.spec, given.values, columns, given.skipped, given.constant)
+
+
+def save_kept(journal: Journal, listing: Listing, spec: DescriptorSpec, path: Path | str) -> None:
+    """`save_descriptors` of what `described` left in a journal; only the names are in memory."""
+    values = Pieces((len(listing.frames), spec.length), lambda: kept_rows(journal))
+    _save(path, spec, values, listing.columns(), listing.tally.skipped, listing.tally.constant)
+
+
+def _save(
+    path: Path | str,
+    spec: DescriptorSpec,
+    values: Floats | Pieces,
+    columns: tuple[tuple[str, ...], tuple[str, ...], NDArray[np.float64], tuple[str, ...]],
+    skipped: int,
+    constant: int,
+) -> None:
+    frames, sequences, times, places = columns
+    arrays: dict[str, Any] = {
+        "descriptors": values,
+        "frames": np.array(frames, np.str_),
+        "sequences": np.array(sequences, np.str_),
+        "times": times,
+        "places": np.array(places, np.str_),
     }
-    meta = {"format": "placerec-descriptors", "version": 1, "descriptor": descriptors.spec.as_dict()}
-    counts = {"skipped": descriptors.skipped, "constant": descriptors.constant}
-    write_npz(Path(path), arrays, meta | counts)
+    meta = {"format": "placerec-descriptors", "version": 1, "descriptor": spec.as_dict()}
+    write_npz(Path(path), arrays, meta | {"skipped": skipped, "constant": constant})

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError
+from placerec.frames.sequence import Gray
 from placerec.version import __version__
-from placerec.vision.chunks import CHUNK, Rows, Source, chunks
+from placerec.vision.chunks import CHUNK, Rows, Source, chunks, stored
 from placerec.vision.describe import Descriptors
-from placerec.vision.images import Gray
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
 from placerec.vision.quality import MapQuality, map_quality
 from placerec.vision.som import RULES, WIDTH, Progress, best_units, train_som
@@ -111,7 +111,7 @@ class Dictionary:
         """Learn size x size words from descriptors (n, spec.length) in time order (readings A25-A29).
 
         `descriptors`: an array, a memory map, or a function that gives an iterator over float32 pieces of any length
-        and is called once for every pass: its memory then does not grow with n but for four bytes a frame.
+        and is called three times: the memory then does not grow with n but for four bytes a frame.
         `fraction`: the share of the frames, drawn by the seed, that PCA and map see. `units`: answer with those
         that at least one training frame hit (`live`: no language model can know the others), or with `all`.
         `rule`, `width`, `epochs`: how the map learns, see `train_som`. `progress`: called with epoch, epochs and
@@ -129,10 +129,10 @@ class Dictionary:
         pca = fit_pca(data, components)
         if data.n < size * size:
             log.warning("%d frames cannot fill the %d words of a map of size %d", data.n, size * size, size)
-        # What came in memory stays there, at a fifth of its size; what was streamed is projected anew in every pass.
-        codes = projected(source, pca) if callable(descriptors) else np.concatenate(list(projected(source, pca)()))
-        som = train_som(codes, size, rng=rng, rule=rule, width=width, epochs=epochs, progress=progress)
-        got = map_quality(codes, som.codebook, som.hits)
+        # A fifth of the descriptors, for many passes.
+        with stored(projected(source, pca)) as codes:
+            som = train_som(codes, size, rng=rng, rule=rule, width=width, epochs=epochs, progress=progress)
+            got = map_quality(codes, som.codebook, som.hits)
         errors = got.quantisation_error, got.topographic_error, got.entropy, got.dead
         quality = Quality(frames or data.n, data.n, som.epochs, pca.explained, pca.needed, *errors)
         return cls(spec, pca, som.codebook, som.hits, training, quality)

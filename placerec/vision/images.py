@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError
-
-Gray = NDArray[np.uint8 | np.float32]
+from placerec.frames.sequence import Gray
 
 FITS = ("squash", "crop")
 SMALLEST = 8

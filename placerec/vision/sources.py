@@ -2,11 +2,15 @@
 
 import logging
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 from placerec.files import whole_file
 from placerec.frames import Reading, find_sequences
-from placerec.vision.describe import Progress, describe, save_descriptors
+from placerec.jobs import Map, Progress
+from placerec.journal import open_journal
+from placerec.vision.chunks import Source
+from placerec.vision.describe import describe, kept_rows, list_described, save_descriptors, save_kept
 from placerec.vision.dictionary import Dictionary, Quality
 from placerec.vision.quality import MapQuality
 from placerec.vision.som import WIDTH
@@ -22,18 +26,24 @@ def describe_sources(
     spec: DescriptorSpec | None = None,
     matrix: Path | str | None = None,
     reading: Reading = Reading(),
+    work: Map | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Write the descriptors of all frames of the sources to `out`; `progress` is called with frames done and in all.
 
-    `spec`, `matrix`: as for `describe`. Raises SourceError for sources and VisionError for images or a matrix that
-    cannot be used, OutputError for the file.
+    `spec`, `matrix`, `work`: as for `describe`. The descriptors are kept in a file beside `out` while the work goes
+    on, not in memory; after a run that was killed or interrupted the next one goes on from there. Raises SourceError
+    for sources and VisionError for images or a matrix that cannot be used, OutputError for the file.
     """
     # The file comes first: that it cannot be written must not be found out after an hour of images.
-    with whole_file(Path(out)) as partial:
-        save_descriptors(
-            describe(find_sequences(sources, reading=reading), spec, matrix=matrix, progress=progress), partial
-        )
+    with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
+        sequences = find_sequences(sources, reading=reading)
+        if matrix is not None:
+            save_descriptors(describe(sequences, spec, matrix=matrix), unfinished)
+            return
+        spec = spec or DescriptorSpec()
+        listing = list_described(sequences, spec, journal, work, progress)
+        save_kept(journal, listing, spec, unfinished)
 
 
 def train_dictionary(
@@ -52,22 +62,30 @@ def train_dictionary(
     rule: str = "batch",
     width: float = WIDTH,
     held_out: Iterable[Path | str] = (),
+    work: Map | None = None,
     progress: Progress | None = None,
 ) -> Dictionary:
     """Describe the frames of the sources, fit a dictionary to them (`Dictionary.fit`) and write it to `out`.
 
-    `spec`, `matrix`: as for `describe`. `held_out`: sources that train nothing; how well the map represents them
-    (`Dictionary.measure`) is noted. `progress` is called with frames described and in all. Raises as
-    `describe_sources` and `Dictionary.fit` do.
+    `spec`, `matrix`, `work`: as for `describe_sources`, which tells of memory and of killed runs, too. `held_out`:
+    sources that train nothing; how well the map represents them (`Dictionary.measure`) is noted. `progress` is called
+    with frames described and in all. Raises as `describe_sources` and `Dictionary.fit` do.
     """
-    with whole_file(Path(out)) as partial:
+    with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
         training, others = find_sequences(sources, reading=reading), find_sequences(held_out, reading=reading)
         seen, unseen = (sum(len(sequence.frames) for sequence in some) for some in (training, others))
         tell = progress or (lambda done, total: None)
-        described = describe(training, spec, matrix=matrix, progress=lambda done, _: tell(done, seen + unseen))
+        values: Source
+        if matrix is not None:
+            found = describe(training, spec, matrix=matrix)
+            spec, values = found.spec, found.values
+        else:
+            spec = spec or DescriptorSpec()
+            list_described(training, spec, journal, work, lambda done, _: tell(done, seen + unseen))
+            values = partial(kept_rows, journal)
         dictionary = Dictionary.fit(
-            described.values,
-            spec=described.spec,
+            values,
+            spec=spec,
             size=size,
             components=components,
             seed=seed,
@@ -77,11 +95,11 @@ def train_dictionary(
             rule=rule,
             width=width,
         )
-        dictionary.save(partial)
+        dictionary.save(unfinished)
         _report(dictionary)
         if others:
             more = describe(
-                others, described.spec, matrix=matrix, progress=lambda done, _: tell(seen + done, seen + unseen)
+                others, spec, matrix=matrix, work=work, progress=lambda done, _: tell(seen + done, seen + unseen)
             )
             _report_held_out(dictionary.measure(more))
     return dictionary

@@ -5,10 +5,11 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from placerec.errors import VisionError
+from placerec.frames.sequence import Gray
 from placerec.vision.centrist import LENGTH, centrist
 from placerec.vision.exact import TERMS
 from placerec.vision.gist import VARIANTS, Floats, gist
-from placerec.vision.images import FITS, SMALLEST, Gray, check_gray, fit_image
+from placerec.vision.images import FITS, SMALLEST, check_gray, fit_image
 
 # Kind -> the settings that it has. `npy`: computed elsewhere, of a length that its file tells.
 SETTINGS = {

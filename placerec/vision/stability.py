@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from placerec.errors import SourceError, VisionError
 from placerec.frames import Frame, Sequence, read_gray
-from placerec.vision.describe import Progress
+from placerec.frames.sequence import Gray
+from placerec.jobs import Progress
 from placerec.vision.dictionary import Dictionary
-from placerec.vision.images import Gray
 from placerec.vision.spec import DescriptorSpec, check_describes_images, descriptor
 
 log = logging.getLogger(__name__)

@@ -4,8 +4,9 @@ import hashlib
 import json
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,27 @@ from placerec.files import whole_file
 Arrays = dict[str, NDArray[Any]]
 
 
-def write_npz(path: Path, arrays: Arrays, meta: dict[str, Any]) -> None:
-    """Write the arrays and `meta`, whole or not at all; OutputError if the file cannot be written."""
-    with whole_file(Path(path)) as partial, partial.open("wb") as file:
-        # An open file and not a name: numpy would add .npz to another suffix.
-        content: dict[str, Any] = {**arrays, "meta": np.array(_text(meta))}
-        np.savez(file, **content)
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """A float32 matrix that is not in memory: `pieces()` gives all of its rows, in order."""
+
+    shape: tuple[int, int]
+    pieces: Callable[[], Iterable[NDArray[np.float32]]]
+
+
+def write_npz(path: Path, arrays: Mapping[str, NDArray[Any] | Pieces], meta: dict[str, Any]) -> None:
+    """Write the arrays and `meta` as numpy.savez does, whole or not at all; OutputError if it cannot be written."""
+    content = {**arrays, "meta": np.array(_text(meta))}
+    with whole_file(Path(path)) as partial, zipfile.ZipFile(partial, "w", allowZip64=True) as archive:
+        for name, array in content.items():
+            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
+                if isinstance(array, Pieces):
+                    header = {"descr": "<f4", "fortran_order": False, "shape": array.shape}
+                    np.lib.format.write_array_header_1_0(file, header)
+                    for piece in array.pieces():
+                        file.write(piece.astype("<f4", copy=False).tobytes())
+                else:
+                    np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=False)
 
 
 def read_npz(path: Path, names: tuple[str, ...]) -> tuple[Arrays, dict[str, Any]]:

@@ -22,6 +22,7 @@ from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
 
 COLUMNS = ("frame", "time", "place", "word", "distance")
+HEADER = "\t".join(COLUMNS) + "\n"
 # SRILM gives these a meaning of their own, and skips lines that start with ##.
 RESERVED = ("<s>", "</s>", "<unk>", "-pau-")
 
@@ -59,7 +60,12 @@ def format_seconds(time: float) -> str:
 
 def write_stream(stream: WordStream, path: Path | str) -> None:
     """Write a token stream file, whole or not at all."""
-    lines = ["\t".join(COLUMNS)]
+    write_text(Path(path), HEADER + format_rows(stream))
+
+
+def format_rows(stream: WordStream) -> str:
+    """The lines of a token stream file after its header; StreamError for a frame's name that a line cannot hold."""
+    lines = []
     for frame in stream.frames:
         if set(frame) & set("\t\n\r"):
             raise StreamError(f"{stream.name}: the frame {frame!r} holds a tab or a line end; rename the image")
@@ -67,8 +73,8 @@ def write_stream(stream: WordStream, path: Path | str) -> None:
         stream.frames, stream.times, stream.places, stream.words, stream.distances, strict=True
     ):
         shown = "" if math.isnan(distance) else f"{distance:.6g}"
-        lines.append(f"{frame}\t{format_seconds(time)}\t{place}\t{word}\t{shown}")
-    write_text(Path(path), "\n".join(lines) + "\n")
+        lines.append(f"{frame}\t{format_seconds(time)}\t{place}\t{word}\t{shown}\n")
+    return "".join(lines)
 
 
 def read_stream(path: Path | str) -> WordStream:

@@ -2,14 +2,23 @@
 
 import json
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
-from placerec.files import whole_folder, write_text
+import numpy as np
+
+from placerec.files import encoded, whole_folder, write_text
 from placerec.frames import Reading, find_sequences
+from placerec.frames import Sequence as FrameSequence
+from placerec.frames.batches import Batch
+from placerec.jobs import Map, Progress
+from placerec.journal import Journal, open_journal
 from placerec.version import __version__
 from placerec.vision import Descriptors, Dictionary, describe
-from placerec.words.stream import WordStream, write_stream, write_vocabulary
+from placerec.vision.spec import check_describes_images
+from placerec.vision.work import Answer, Tally, answers, describe_batch
+from placerec.words.stream import HEADER, WordStream, format_rows, write_vocabulary
 
 OWNED = ("*.tsv", "vocab.txt", "tokens.json")
 log = logging.getLogger(__name__)
@@ -22,20 +31,22 @@ def tokenize(
     *,
     matrix: Path | str | None = None,
     reading: Reading = Reading(),
-    progress: Callable[[int, int], None] | None = None,
+    work: Map | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """`placerec tokenize`: write the tokens folder `out` (one .tsv per sequence, vocab.txt) of image sources.
 
     `words`: the words.npz to use. `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed
-    elsewhere (`describe`). tokens.json names its fingerprint, so that models know what they were trained on.
+    elsewhere (`describe`). `work`: who does the work (`jobs.workers`), None for threads; the bytes are the same with
+    any. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes on from
+    there. tokens.json names the dictionary's fingerprint, so that models know what they were trained on.
     """
     dictionary = Dictionary.load(Path(words))
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
-    with whole_folder(Path(out), OWNED) as folder:
-        streams = streams_of(sources, dictionary, matrix=matrix, reading=reading, progress=progress)
-        _write(streams, dictionary, folder)
-    seen = len({word for stream in streams for word in stream.words})
-    log.info("%s: %d sequences, %d of %d words seen", out, len(streams), seen, len(dictionary.vocabulary))
+    with whole_folder(Path(out), OWNED) as folder, open_journal(Path(out)) as journal:
+        parts = _parts(sources, dictionary, matrix, reading, work, journal, progress)
+        names, seen = _write(parts, dictionary, folder)
+    log.info("%s: %d sequences, %d of %d words seen", out, len(names), len(seen), len(dictionary.vocabulary))
 
 
 def streams_of(
@@ -44,17 +55,17 @@ def streams_of(
     *,
     matrix: Path | str | None = None,
     reading: Reading = Reading(),
-    progress: Callable[[int, int], None] | None = None,
+    work: Map | None = None,
+    progress: Progress | None = None,
 ) -> list[WordStream]:
     """The token streams of image sources: each frame's best-matching unit in `dictionary`.
 
-    `matrix`: as for `tokenize`. Raises VisionError for a dictionary that needs one if there is none.
+    `matrix`, `work`: as for `tokenize`. Raises VisionError for a dictionary that needs a matrix if there is none.
     """
-    sequences = find_sequences(sources, reading=reading)
-    streams = tokens_of(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary)
-    for name in sorted({sequence.name for sequence in sequences} - {stream.name for stream in streams}):
-        log.warning("%s: none of its images can be read; the sequence is left out", name)
-    return streams
+    pieces: dict[str, list[WordStream]] = {}
+    for part in _parts(sources, dictionary, matrix, reading, work, None, progress):
+        pieces.setdefault(part.name, []).append(part)
+    return [_joined(parts) for parts in pieces.values()]
 
 
 def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStream]:
@@ -82,9 +93,83 @@ def write_tokens(streams: Iterable[WordStream], dictionary: Dictionary, out: Pat
         _write(streams, dictionary, folder)
 
 
-def _write(streams: Iterable[WordStream], dictionary: Dictionary, folder: Path) -> None:
-    for stream in streams:
-        write_stream(stream, folder / f"{stream.name}.tsv")
+def tokenize_batch(dictionary: Dictionary, batch: Batch) -> Answer:
+    """The units int64 (m,) and distances float32 (m,) of a batch's frames: a function of its arguments alone."""
+    found = describe_batch(dictionary.spec, batch)
+    units, distances = dictionary.words(found.arrays["values"])
+    return Answer(found.kept, found.blank, found.reasons, {"units": units, "distances": distances})
+
+
+def _parts(
+    sources: Iterable[Path | str],
+    dictionary: Dictionary,
+    matrix: Path | str | None,
+    reading: Reading,
+    work: Map | None,
+    journal: Journal | None,
+    progress: Progress | None,
+) -> Iterator[WordStream]:
+    """Pieces of the token streams, those of a sequence one after the other."""
+    sequences = find_sequences(sources, reading=reading)
+    names = set()
+    if matrix is not None:
+        parts = iter(tokens_of(describe(sequences, dictionary.spec, matrix=matrix), dictionary))
+    else:
+        parts = _tokenized(sequences, dictionary, work, journal, progress)
+    for part in parts:
+        names.add(part.name)
+        yield part
+    for name in sorted({sequence.name for sequence in sequences} - names):
+        log.warning("%s: none of its images can be read; the sequence is left out", name)
+
+
+def _tokenized(
+    sequences: Sequence[FrameSequence],
+    dictionary: Dictionary,
+    work: Map | None,
+    journal: Journal | None,
+    progress: Progress | None,
+) -> Iterator[WordStream]:
+    check_describes_images(dictionary.spec)
+    function, tally, key = partial(tokenize_batch, dictionary), Tally(), dictionary.fingerprint
+    found = answers(function, sequences, dictionary.spec, tally, key=key, work=work, journal=journal, progress=progress)
+    vocabulary = dictionary.vocabulary
+    for batch, answer in found:
+        frames = [batch.frames[k] for k in answer.kept.tolist()]
+        if frames:
+            yield WordStream(
+                batch.sequence,
+                tuple(frame.name for frame in frames),
+                np.array([frame.time for frame in frames], np.float64),
+                tuple(frame.place for frame in frames),
+                tuple(vocabulary[unit] for unit in answer.arrays["units"].tolist()),
+                answer.arrays["distances"].astype(float),
+            )
+    tally.close()
+
+
+def _joined(parts: Sequence[WordStream]) -> WordStream:
+    return WordStream(
+        parts[0].name,
+        tuple(frame for part in parts for frame in part.frames),
+        np.concatenate([part.times for part in parts]),
+        tuple(place for part in parts for place in part.places),
+        tuple(word for part in parts for word in part.words),
+        np.concatenate([part.distances for part in parts]),
+    )
+
+
+def _write(parts: Iterable[WordStream], dictionary: Dictionary, folder: Path) -> tuple[set[str], set[str]]:
+    """The names of the sequences and the words that were written."""
+    names: set[str] = set()
+    seen: set[str] = set()
+    for part in parts:
+        path = folder / f"{part.name}.tsv"
+        with path.open("ab") as file:
+            file.write(encoded(path, format_rows(part) if part.name in names else HEADER + format_rows(part)))
+        names.add(part.name)
+        seen.update(part.words)
     write_vocabulary(dictionary.vocabulary, folder / "vocab.txt")
     description = {"format": "placerec tokens 1", "version": __version__, "dictionary": dictionary.fingerprint}
     write_text(folder / "tokens.json", json.dumps(description, indent=2) + "\n")
+    return names, seen

@@ -11,8 +11,8 @@ from small import write_images
 
 from placerec.errors import VisionError
 from placerec.frames import Sequence, find_sequences, read_gray
+from placerec.frames.sequence import Gray
 from placerec.vision import DescriptorSpec, Dictionary, describe, descriptor, fit_image, stability
-from placerec.vision.images import Gray
 from placerec.vision.stability import CHANGES, Change, Stability, word_changes
 
 SPEC = DescriptorSpec(image_size=16)

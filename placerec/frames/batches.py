@@ -1,0 +1,84 @@
+"""Sequences in pieces: the unit of work that is handed out, kept, and done again if it was lost."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from hashlib import blake2b
+from itertools import islice
+from pathlib import Path
+
+from placerec.frames.sequence import Frame, Gray, Sequence
+
+SIZE = 64  # half a second of work
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Some consecutive frames of a sequence. `first`: the index of the first of them there.
+
+    `images`: their grey levels, or why there are none; None if each is still in a file of its own.
+    """
+
+    sequence: str
+    first: int
+    frames: tuple[Frame, ...]
+    images: tuple[Gray | str, ...] | None = None
+
+
+def batches(sequences: Iterable[Sequence]) -> Iterator[tuple[Sequence, Batch]]:
+    """All frames, in order, in batches of one sequence each; of recordings, without the images.
+
+    Only the frames of an endless recording come with their images, for they are not known before.
+    """
+    for sequence in sequences:
+        recording = sequence.recording
+        if recording is not None and recording.endless:
+            shots = recording.shots()
+            first = 0
+            while some := tuple(islice(shots, SIZE)):
+                frames, images = zip(*some, strict=True)
+                yield sequence, Batch(sequence.name, first, frames, images)
+                first += len(some)
+            continue
+        for first in range(0, len(sequence.frames), SIZE):
+            yield sequence, Batch(sequence.name, first, tuple(sequence.frames[first : first + SIZE]))
+
+
+def with_images(
+    listed: Iterable[tuple[Sequence, Batch]], shrink: Callable[[Gray | str], Gray | str]
+) -> Iterator[Batch]:
+    """The batches, those of recordings with their images, which are read in one pass from the first that is asked for.
+
+    `shrink` makes them smaller, so that little is kept and sent.
+    """
+    shots: Iterator[tuple[Frame, Gray | str]] = iter(())
+    current = ""
+    for sequence, batch in listed:
+        images = batch.images
+        if sequence.recording is not None and images is None:
+            if sequence.name != current:
+                shots, current = sequence.recording.shots(batch.first), sequence.name
+            found = {frame.name: shrink(image) for frame, image in islice(shots, len(batch.frames))}
+            images = tuple(found.get(frame.name, f"{frame.path}: frame {frame.name} is gone") for frame in batch.frames)
+        elif images is not None:
+            images = tuple(map(shrink, images))
+        yield replace(batch, images=images)
+
+
+def content_key(sequence: Sequence, batch: Batch) -> bytes:
+    """A digest of what the batch's images are read from: names, sizes and times of change of the files."""
+    digest = blake2b(digest_size=16)
+    files = [frame.path for frame in batch.frames]
+    if sequence.recording is not None:
+        digest.update(f"{sequence.recording!r} {batch.first} {len(batch.frames)}".encode())
+        files = sequence.recording.files()
+    for path in files:
+        digest.update(f"{path}\0{_state(path)}\n".encode("utf-8", "surrogateescape"))
+    return digest.digest()
+
+
+def _state(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_size, found.st_mtime_ns

@@ -1,0 +1,129 @@
+"""What long work has found so far, in a file: a run that was killed goes on from there.
+
+A record is 16 bytes of BLAKE2b over the rest, the key's and the content's length (8 bytes each, little-endian), the
+key, the content. A record that is cut or damaged ends what is taken from the file; it is written over.
+"""
+
+import os
+import struct
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from hashlib import blake2b
+from pathlib import Path
+from typing import BinaryIO
+
+from placerec.errors import OutputError
+from placerec.files import PARTIAL, sweep_files
+from placerec.jobs import JobError
+
+if sys.platform != "win32":
+    import fcntl
+
+_HEAD = struct.Struct("<16sQQ")
+
+
+class Journal:
+    """Results in their order, each under the key that says what it was made from."""
+
+    def __init__(self, file: BinaryIO, path: Path) -> None:
+        self._file, self._path = file, path
+        self._at = 0
+
+    def next(self, key: bytes) -> bytes | None:
+        """The next result of an earlier run, if it was made under `key`; None, and nothing more, once it was not."""
+        self._file.seek(self._at)
+        record = _read(self._file)
+        if record is None or record[0] != key:
+            return None
+        self._at = self._file.tell()
+        return record[1]
+
+    def add(self, key: bytes, content: bytes) -> None:
+        """Append a result; what an earlier run has from here on is forgotten. OutputError if the disk is full."""
+        rest = struct.pack("<QQ", len(key), len(content)) + key + content
+        try:
+            if self._file.seek(0, os.SEEK_END) != self._at:
+                self._file.truncate(self._at)
+                self._file.seek(self._at)
+            self._file.write(blake2b(rest, digest_size=16).digest() + rest)
+            self._file.flush()
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written: {error.strerror or error}") from error
+        self._at = self._file.tell()
+
+    def contents(self) -> Iterator[bytes]:
+        """All results so far, from the first."""
+        place = 0
+        while place < self._at:
+            self._file.seek(place)
+            record = _read(self._file)
+            if record is None:
+                raise OutputError(f"{self._path}: was changed by something else; run the command again")
+            place = self._file.tell()
+            yield record[1]
+
+
+@contextmanager
+def open_journal(output: Path) -> Iterator[Journal]:
+    """The journal of the run that makes `output`, a hidden file beside it: what a killed or interrupted run left.
+
+    It is removed when the run ends, be it with an error; only an interrupt and a killed worker leave it. Where another
+    run holds it, a nameless file takes its place. OutputError if the folder cannot be written.
+    """
+    path = output.resolve()
+    path = path.parent / (PARTIAL.format(path.name) + "journal")
+    keep = False
+    file, named = _opened(path, output)
+    sweep_files(output.resolve())
+    try:
+        with file:
+            yield Journal(file, output)
+    except (JobError, KeyboardInterrupt):
+        keep = True
+        raise
+    finally:
+        if named and not keep:
+            path.unlink(missing_ok=True)
+
+
+def _opened(path: Path, output: Path) -> tuple[BinaryIO, bool]:
+    """The file to write to, and whether it is `path`."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # A link there is none of ours.
+        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600), "r+b")
+        if _lock(file):
+            return file, True
+        file.close()
+        return tempfile.TemporaryFile(dir=path.parent), False
+    except OSError as error:
+        raise OutputError(f"{output}: cannot be written: {error.strerror or error}") from error
+
+
+def _lock(file: BinaryIO) -> bool:
+    if sys.platform == "win32":
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        # A file system without locks keeps nobody out.
+        return True
+    return True
+
+
+def _read(file: BinaryIO) -> tuple[bytes, bytes] | None:
+    head = file.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        return None
+    digest, key, content = _HEAD.unpack(head)
+    left = os.fstat(file.fileno()).st_size - file.tell()
+    if key + content > left:
+        return None
+    rest = file.read(key + content)
+    if blake2b(head[16:] + rest, digest_size=16).digest() != digest:
+        return None
+    return rest[:key], rest[key:]

@@ -1,0 +1,179 @@
+"""The work that is done on every frame, batch by batch: in several processes, and kept while it goes on."""
+
+import io
+import json
+import logging
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from hashlib import blake2b
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.errors import SourceError, VisionError
+from placerec.frames import Frame, read_gray
+from placerec.frames import Sequence as FrameSequence
+from placerec.frames.batches import Batch, batches, content_key, with_images
+from placerec.frames.sequence import Gray
+from placerec.jobs import Map, Progress, workers
+from placerec.journal import Journal
+from placerec.version import __version__
+from placerec.vision.images import check_gray, fit_image
+from placerec.vision.spec import DescriptorSpec, descriptor
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What was found for a batch: `arrays`, a row for each frame in `kept` (indices in the batch).
+
+    `blank`: which of these rows are of an image of one grey level throughout. `reasons`: why the other frames have
+    none.
+    """
+
+    kept: NDArray[np.int64]
+    blank: NDArray[np.bool_]
+    reasons: tuple[str, ...]
+    arrays: dict[str, NDArray[Any]]
+
+    def pack(self) -> bytes:
+        """As bytes; `unpack` is the way back."""
+        file = io.BytesIO()
+        reasons = np.array(json.dumps(self.reasons))
+        content: dict[str, Any] = {"kept": self.kept, "blank": self.blank, "reasons": reasons, **self.arrays}
+        np.savez(file, **content)
+        return file.getvalue()
+
+    @classmethod
+    def unpack(cls, data: bytes) -> "Answer":
+        """What `pack` made; nothing in it is executed."""
+        with np.load(io.BytesIO(data), allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        return cls(arrays.pop("kept"), arrays.pop("blank"), tuple(json.loads(str(arrays.pop("reasons")))), arrays)
+
+
+@dataclass
+class Tally:
+    """How many frames there were so far, how many could not be read, and how many are of one grey level."""
+
+    frames: int = 0
+    skipped: int = 0
+    constant: int = 0
+
+    def close(self) -> None:
+        """Say what came of it; VisionError if no image could be read."""
+        read = self.frames - self.skipped
+        if not read:
+            raise VisionError(f"none of the {self.frames} images can be read; name a folder with images")
+        constant = f"{self.constant} of one grey level throughout"
+        log.info("%d frames described, %d skipped, %s", read, self.skipped, constant)
+
+
+def describe_batch(spec: DescriptorSpec, batch: Batch) -> Answer:
+    """The descriptors of a batch, `values` float32 (m, spec.length): a function of its arguments alone."""
+    rows, kept, reasons = [], [], []
+    images = batch.images or (None,) * len(batch.frames)
+    for k, (frame, image) in enumerate(zip(batch.frames, images, strict=True)):
+        found = describe_frame(frame, image, spec)
+        if isinstance(found, str):
+            reasons.append(found)
+        else:
+            rows.append(found)
+            kept.append(k)
+    values = np.array(rows, np.float32).reshape(len(rows), spec.length)
+    blank = np.logical_not(values.any(axis=1))
+    return Answer(np.array(kept, np.int64), np.asarray(blank), tuple(reasons), {"values": values})
+
+
+def describe_frame(frame: Frame, image: Gray | str | None, spec: DescriptorSpec) -> NDArray[np.float32] | str:
+    """A frame's descriptor, or the reason why there is none; `image`: None if it is still in its file."""
+    if isinstance(image, str):
+        return image
+    try:
+        return descriptor(read_gray(frame.path) if image is None else image, spec)
+    except SourceError as error:
+        return str(error)
+    except VisionError as error:
+        return f"{frame.path}: {error}" if image is None else f"{frame.path}: frame {frame.name}: {error}"
+
+
+def answers(
+    function: Callable[[Batch], Answer],
+    sequences: Sequence[FrameSequence],
+    spec: DescriptorSpec,
+    tally: Tally,
+    *,
+    key: str,
+    work: Map | None = None,
+    journal: Journal | None = None,
+    progress: Progress | None = None,
+) -> Iterator[tuple[Batch, Answer]]:
+    """`function` of every batch of the sequences, in order; what could not be read is named in warnings and counted.
+
+    `key`: what the answers depend on besides the images; by it, `journal` gives back those of a run that was cut
+    short, and keeps the others. `progress` is called with frames done and in all, 0 for a camera.
+    """
+    endless = any(sequence.recording is not None and sequence.recording.endless for sequence in sequences)
+    # Ctrl-C ends what a camera records, and would end other processes.
+    work = workers() if endless or work is None else work
+    total = 0 if endless else sum(len(sequence.frames) for sequence in sequences)
+    for batch, answer in _found(function, sequences, spec, key, work, None if endless else journal):
+        for reason in answer.reasons:
+            log.warning("%s; the frame is skipped", reason)
+        blank = answer.kept[answer.blank].tolist()
+        if blank and not tally.constant:
+            frame = batch.frames[blank[0]]
+            log.warning("%s: of one grey level throughout; its descriptor is zero", frame.path)
+        tally.frames += len(batch.frames)
+        tally.skipped += len(answer.reasons)
+        tally.constant += len(blank)
+        if progress is not None:
+            progress(tally.frames, total)
+        yield batch, answer
+
+
+def _found(
+    function: Callable[[Batch], Answer],
+    sequences: Sequence[FrameSequence],
+    spec: DescriptorSpec,
+    key: str,
+    work: Map,
+    journal: Journal | None,
+) -> Iterator[tuple[Batch, Answer]]:
+    listed = batches(sequences)
+    whole = blake2b(f"{key} {__version__} {json.dumps(spec.as_dict())}".encode(), digest_size=16).digest()
+    ahead: list[tuple[FrameSequence, Batch]] = []
+    if journal is not None:
+        for sequence, batch in listed:
+            data = journal.next(whole + content_key(sequence, batch))
+            if data is None:
+                ahead = [(sequence, batch)]
+                break
+            yield batch, Answer.unpack(data)
+    # What is handed out is remembered until its answer comes: frames and keys, not images.
+    pending: deque[tuple[Batch, bytes]] = deque()
+
+    def handed_out() -> Iterator[tuple[FrameSequence, Batch]]:
+        for sequence, batch in chain(ahead, listed):
+            pending.append((batch, whole + content_key(sequence, batch) if journal is not None else b""))
+            yield sequence, batch
+
+    for answer in work(function, with_images(handed_out(), lambda image: _shrunk(image, spec))):
+        batch, its = pending.popleft()
+        if journal is not None:
+            journal.add(its, answer.pack())
+        yield batch, answer
+
+
+def _shrunk(image: Gray | str, spec: DescriptorSpec) -> Gray | str:
+    """The image as it is fitted for its descriptor, which is the first that is done to it anyway."""
+    if isinstance(image, str):
+        return image
+    try:
+        return fit_image(check_gray(image), spec.image_size, spec.fit)
+    except VisionError:
+        return image  # and what describes it says why
