@@ -97,10 +97,15 @@ def read_entries(name: str) -> dict[tuple[str, ...], Entry]:
 ENTRIES = {name: read_entries(name) for name in FOLDERS}
 
 
-def log10_p(entries: dict[tuple[str, ...], Entry], word: str, history: str) -> float:
-    if not history or (history, word) in entries:
-        return entries[(history, word) if history else (word,)][0]
-    return entries[(history,)][1] + entries[(word,)][0]
+NAMED = re.compile(r"p\((\w+)(?: \| (\w+))?\)|b\((\w+)\)")
+
+
+def log10(named: re.Match[str], entries: dict[tuple[str, ...], Entry]) -> float:
+    """log10 of p(w), p(w | h) or b(h), of what stands in the model's file."""
+    word, history, context = named.groups()
+    if context or not history:
+        return entries[(context or word,)][1 if context else 0]
+    return entries[history, word][0] if (history, word) in entries else entries[(history,)][1] + entries[(word,)][0]
 
 
 OPERATIONS: dict[type, Callable[[float, float], float]] = {
@@ -113,8 +118,7 @@ OPERATIONS: dict[type, Callable[[float, float], float]] = {
 
 def value(text: str, entries: dict[tuple[str, ...], Entry]) -> float:
     """The value of an expression with p(w | h) and b(h), as the model's file has these."""
-    p = re.sub(r"p\((\w+)(?: \| (\w+))?\)", lambda found: repr(10 ** log10_p(entries, found[1], found[2] or "")), text)
-    b = re.sub(r"b\((\w+)\)", lambda found: repr(10 ** entries[(found[1],)][1]), p)
+    numbers = NAMED.sub(lambda named: repr(10 ** log10(named, entries)), text).replace(" x ", " * ")
 
     def walk(node: ast.expr) -> float:
         if isinstance(node, ast.BinOp):
@@ -122,7 +126,7 @@ def value(text: str, entries: dict[tuple[str, ...], Entry]) -> float:
         assert isinstance(node, ast.Constant), text
         return float(node.value)  # type: ignore[arg-type]
 
-    return walk(ast.parse(b.replace(" x ", " * "), mode="eval").body)
+    return walk(ast.parse(numbers, mode="eval").body)
 
 
 # The folder that a computation is about is that of its heading.
@@ -142,15 +146,17 @@ def test_there_is_something_to_compute() -> None:
 
 @pytest.mark.parametrize(("name", "line"), SUMS)
 def test_the_computations_are_right_and_are_the_files(name: str, line: str) -> None:
-    equal, _, log10 = line.partition(", log10 = ")
+    equal, _, logarithm = line.partition(", log10 = ")
     said = equal.split(" = ")
     values = [value(text, ENTRIES[name]) for text in said]
     assert len(values) >= 2
-    assert values == pytest.approx([values[0]] * len(values), rel=2e-5)
-    # The last number is right to its last digit, and so is the logarithm.
+    # There are six digits on the way, and the last number is right to its last one.
+    assert values == pytest.approx([values[0]] * len(values), abs=1e-6)
     assert said[-1] == f"{values[0]:.{len(said[-1].partition('.')[2])}f}"
-    if log10:
-        assert float(log10) == pytest.approx(math.log10(values[0]), abs=1e-6)
+    if logarithm:
+        named = NAMED.fullmatch(said[0])
+        assert named is not None
+        assert logarithm == f"{log10(named, ENTRIES[name]):.7g}"
 
 
 @pytest.mark.parametrize("name", FOLDERS)
@@ -166,7 +172,7 @@ def test_the_table_is_that_of_the_files(name: str) -> None:
 def test_numbers_in_the_text_are_right() -> None:
     added, total = re.search(r"that is one addition: (.*) = (\S+)\. ", README).groups()  # type: ignore[union-attr]
     assert sum(map(float, added.split(" + "))) == pytest.approx(float(total), abs=1e-9)
-    assert float(total) == pytest.approx(log10_p(ENTRIES["witten-bell"], "w2", "w7"), abs=1e-6)
+    assert float(total) == pytest.approx(math.log10(value("p(w2 | w7)", ENTRIES["witten-bell"])), abs=1e-7)
     assert "p(w8 | w7) is just (1 - 0.5) / 3 = 0.166667" in README
     assert value("p(w8 | w7)", ENTRIES["absolute-backoff"]) == pytest.approx(0.5 / 3, rel=1e-6)
     backoff = ENTRIES["witten-bell-backoff"]
