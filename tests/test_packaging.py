@@ -2,7 +2,6 @@
 
 import os
 import re
-import resource
 import shutil
 import subprocess
 import sys
@@ -131,12 +130,12 @@ def test_the_installed_command_and_the_module_are_the_same(built: Path, tmp_path
 
 def test_the_version_is_written_in_one_place() -> None:
     here = re.compile(rf"(?<![\w.]){re.escape(__version__)}(?![\w.])")
-    looked_at = [ROOT / "README.md", ROOT / "pyproject.toml"]
-    looked_at += [path for name in ("bin", "docs", "placerec", "tests") for path in (ROOT / name).rglob("*")]
-    texts = [path for path in looked_at if path.suffix in (".py", ".md", ".toml", "") and path.is_file()]
-    assert len(texts) > 300
-    holding = {path.relative_to(ROOT).as_posix() for path in texts if here.search(path.read_text(encoding="utf-8"))}
-    assert holding == {"placerec/version.py", "docs/changelog.md"}
+    looked_at = [ROOT / "README.md", ROOT / "pyproject.toml", *filter(Path.is_file, (ROOT / "bin").iterdir())]
+    looked_at += [path for name in ("placerec", "tests") for path in (ROOT / name).rglob("*.py")]
+    assert len(looked_at) > 300
+    assert [path for path in looked_at if here.search(path.read_text(encoding="utf-8"))] == [
+        ROOT / "placerec/version.py"
+    ]
 
 
 def test_the_newest_version_of_the_changelog_is_this_one() -> None:
@@ -150,12 +149,13 @@ def test_the_newest_version_of_the_changelog_is_this_one() -> None:
 
 def test_help_costs_little_more_than_importing_click() -> None:
     """In processor time, which other work on the machine changes less than the time on the clock."""
+    resource = pytest.importorskip("resource")
 
     def cost(*command: str) -> float:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run([sys.executable, *command], check=True, stdout=subprocess.DEVNULL)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        return float(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
     runs = [(cost("-m", "placerec", "--help"), cost("-c", "import click")) for _ in range(5)]
     assert min(ours for ours, _ in runs) < min(click for _, click in runs) + 0.1
