@@ -60,7 +60,7 @@ def decode_gray(data: bytes, name: str) -> Gray:
 
 
 def as_gray(pixels: NDArray[Any], name: str) -> Gray:
-    """Decoded grey levels (h, w) as 0..255; raises SourceError for a side below 8 pixels and other than 8 or 16 bits."""
+    """Decoded grey levels (h, w) as 0..255; SourceError for a side below 8 pixels, or not 8 or 16 bits."""
     height, width = pixels.shape[:2]
     if min(height, width) < MIN_SIDE:
         raise SourceError(f"{name}: is {width}x{height} pixels, and {MIN_SIDE} a side are needed; remove it")

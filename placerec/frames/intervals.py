@@ -8,6 +8,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from placerec.errors import SourceError, at
@@ -72,7 +73,7 @@ def read_intervals(path: Path) -> Intervals:
         if fields:
             found.append(_interval(path, number, fields))
     found.sort(key=lambda one: (one.start, one.line))
-    for before, one in zip(found, found[1:], strict=False):
+    for before, one in pairwise(found):
         if one.start < before.end:
             what = f"{one.start:g} to {one.end:g} overlaps {before.start:g} to {before.end:g} of line {before.line}"
             raise SourceError(at(path, one.line, f"{what}; change one of them"))

@@ -88,7 +88,7 @@ def _opened(path: Path, *, packets: bool = False) -> Iterator[Any]:
         capture = cv2.VideoCapture(os.path.abspath(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1] if packets else [])
     try:
         if not capture.isOpened():
-            raise SourceError(f"{path}: is no video that OpenCV can read, or its index is missing; convert or remove it")
+            raise SourceError(f"{path}: is no video that OpenCV can read, or has lost its index; remove it")
         yield capture
     finally:
         capture.release()

@@ -5,6 +5,7 @@ category` labels a range, both ends included; `-1 -1 end` ends the floor, and a 
 """
 
 import logging
+import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -24,8 +25,8 @@ log = logging.getLogger(__name__)
 
 def find_list(floor: Path) -> Path | None:
     """The label.txt that labels the images in the folder of a floor; None if there is none."""
-    path = floor.parent / LIST
-    return path if path.is_file() and _FLOOR.fullmatch(_first_line(path)) else None
+    path = Path(os.path.abspath(floor)).parent / LIST
+    return floor.parent / LIST if path.is_file() and Path(os.path.abspath(floor)).name in _floors(path) else None
 
 
 def read_places(path: Path, floor: str, images: Iterable[str]) -> PlaceList:
@@ -52,13 +53,14 @@ def read_places(path: Path, floor: str, images: Iterable[str]) -> PlaceList:
     return PlaceList(path, places, lines)
 
 
-def _first_line(path: Path) -> str:
-    """The first line of what may be any file."""
+def _floors(path: Path) -> set[str]:
+    """The floors in what may be any file, none if it does not begin with one."""
     try:
-        with path.open("rb") as file:
-            return file.readline(300).decode(errors="replace").strip("\ufeff \t\r\n")
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            lines = [line.strip() for line in file if line.strip()]
     except OSError:
-        return ""
+        return set()
+    return {line[:-1] for line in lines if _FLOOR.fullmatch(line)} if lines and _FLOOR.fullmatch(lines[0]) else set()
 
 
 def _section(path: Path, floor: str) -> Iterator[tuple[int, list[str]]]:
