@@ -3,9 +3,10 @@
 import logging
 import struct
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -60,15 +61,9 @@ class Bag:
             yield frame, f"{self.path}: frame {frame.name} cannot be read again"
 
     def _gray(self, frame: Frame, kind: str, data: bytes) -> Gray | str:
-        from rosbags.typesys import Stores, get_typestore
-
         name = f"{self.path}: frame {frame.name} of {self.topic}"
         try:
-            if self.path.suffix == ".bag":
-                message = get_typestore(Stores.ROS1_NOETIC).deserialize_ros1(data, kind)
-            else:
-                message = get_typestore(Stores.LATEST).deserialize_cdr(data, kind)
-            return gray_of(message, kind, name)
+            return gray_of(_parser(_is_ros1(self.path))(data, kind), kind, name)
         except PlacerecError as error:
             return str(error)
         except Exception as error:  # Of what a damaged message makes the parser raise there is no list.
@@ -93,7 +88,7 @@ def list_bag(path: Path, topic: str | None) -> tuple[str, "array[int]", list[flo
     with _opened(path) as reader:
         topic = _choose(path, reader, topic)
         for _, when, data in _messages(reader, path, topic):
-            stamps.append(_stamp(data, path.suffix == ".bag") or when)
+            stamps.append(_stamp(data, _is_ros1(path)) or when)
             stored.append(when)
     if not stored:
         raise SourceError(f"{path}: holds no image on {topic}; name another topic, or remove it")
@@ -116,7 +111,7 @@ def _opened(path: Path) -> Iterator[Any]:
     except ImportError as error:
         raise MissingExtraError("rosbags", f"{path}: a bag", "pip install 'placerec[bag]'") from error
     try:
-        reader = Reader1(path) if path.suffix == ".bag" else Reader2(path)
+        reader = Reader1(path) if _is_ros1(path) else Reader2(path)
         reader.open()
     except OSError as error:
         raise SourceError(f"{path}: cannot be read: {error.strerror or error}") from error
@@ -129,12 +124,25 @@ def _opened(path: Path) -> Iterator[Any]:
         reader.close()
 
 
+def _is_ros1(path: Path) -> bool:
+    return path.suffix.lower() == ".bag"
+
+
+@cache
+def _parser(ros1: bool) -> Callable[[bytes, str], Any]:
+    """What makes a message of its bytes and type; both types are the same in all releases of ROS 1, and of ROS 2."""
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST)
+    return store.deserialize_ros1 if ros1 else store.deserialize_cdr
+
+
 def _choose(path: Path, reader: Any, topic: str | None) -> str:
     """The topic that is asked for, or the only one of images."""
     kinds = {connection.topic: connection.msgtype for connection in reader.connections}
     images: list[str] = sorted(name for name, kind in kinds.items() if kind in (RAW, COMPRESSED))
     if topic is not None:
-        topic = topic if topic in kinds else f"/{topic}"
+        topic = next((name for name in (topic, f"/{topic}") if name in kinds), topic)
         if topic in images:
             return topic
         what = f"{topic} is of {kinds[topic]}, not of images" if topic in kinds else f"has no topic {topic}"

@@ -5,6 +5,7 @@ UTF-8; `#` begins a comment, blank lines mean nothing, lines in any order. An in
 
 import logging
 import math
+import os
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -90,8 +91,9 @@ def find_intervals(recording: Path, name: str, labels: Path | None, *, alone: bo
         if not alone:
             raise SourceError(f"{labels}: is one file for several recordings; name a folder that holds {name}{SUFFIX}")
         return read_intervals(labels)
-    own = recording.name if recording.is_dir() else recording.stem
-    path = recording.absolute().parent / f"{own}{SUFFIX}" if labels is None else labels / f"{name}{SUFFIX}"
+    here = recording if recording.name not in ("", "..") else Path(os.path.abspath(recording))
+    own = here.name if here.is_dir() else here.stem
+    path = here.parent / f"{own}{SUFFIX}" if labels is None else labels / f"{name}{SUFFIX}"
     if path.exists():
         return read_intervals(path)
     log.log(logging.INFO if labels is None else logging.WARNING, "%s: no %s; its frames have no label", recording, path)
