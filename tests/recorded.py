@@ -30,7 +30,7 @@ def write_video(path: Path, codec: str = "mp4v", frames: Sequence[Picture] | Non
     frames = pictures() if frames is None else frames
     path.parent.mkdir(parents=True, exist_ok=True)
     size = frames[0].shape[1], frames[0].shape[0]
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*codec), rate, size)
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), rate, size)
     assert writer.isOpened()
     for frame in frames:
         writer.write(frame)

@@ -25,8 +25,9 @@ log = logging.getLogger(__name__)
 
 def find_list(floor: Path) -> Path | None:
     """The label.txt that labels the images in the folder of a floor; None if there is none."""
-    path = Path(os.path.abspath(floor)).parent / LIST
-    return floor.parent / LIST if path.is_file() and Path(os.path.abspath(floor)).name in _floors(path) else None
+    floor = floor if floor.name not in ("", "..") else Path(os.path.abspath(floor))
+    path = floor.parent / LIST
+    return path if path.is_file() and floor.name in _floors(path) else None
 
 
 def read_places(path: Path, floor: str, images: Iterable[str]) -> PlaceList:
