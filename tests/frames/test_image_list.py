@@ -2,6 +2,7 @@
 
 import io
 import math
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,9 +11,11 @@ import pytest
 from placerec.errors import SourceError
 from placerec.frames import Reading, Sequence, find_sequences
 
+Listed = Callable[..., Sequence]
+
 
 @pytest.fixture
-def given(monkeypatch: pytest.MonkeyPatch) -> object:
+def given(monkeypatch: pytest.MonkeyPatch) -> Listed:
     def listed(text: str | bytes, every: int = 1) -> Sequence:
         data = text if isinstance(text, bytes) else text.encode()
         monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(data)))
@@ -22,7 +25,7 @@ def given(monkeypatch: pytest.MonkeyPatch) -> object:
     return listed
 
 
-def test_paths_alone(given) -> None:  # type: ignore[no-untyped-def]
+def test_paths_alone(given: Listed) -> None:
     sequence = given("b/2.png\n\nb/1.png\r\na/1.png")
     assert (sequence.name, sequence.recording) == ("stdin", None)
     assert [frame.name for frame in sequence.frames] == ["b/2.png", "b/1.png", "a/1.png"]
@@ -31,7 +34,7 @@ def test_paths_alone(given) -> None:  # type: ignore[no-untyped-def]
     assert [frame.name for frame in given("1\n2\n3\n4\n5\n", every=2).frames] == ["1", "3", "5"]
 
 
-def test_seconds_and_places(given) -> None:  # type: ignore[no-untyped-def]
+def test_seconds_and_places(given: Listed) -> None:
     sequence = given("a.png\t2.5\thall\nb.png\t-1e1\nc d.png\t2\tkitchen\n")
     rows = [(frame.name, frame.time, frame.place) for frame in sequence.frames]
     assert rows == [("b.png", -10, ""), ("c d.png", 2, "kitchen"), ("a.png", 2.5, "hall")]
@@ -39,7 +42,7 @@ def test_seconds_and_places(given) -> None:  # type: ignore[no-untyped-def]
     assert [(math.isnan(frame.time), frame.place) for frame in untimed.frames] == [(True, "hall"), (True, "")]
 
 
-def test_names_need_not_be_utf8(given) -> None:  # type: ignore[no-untyped-def]
+def test_names_need_not_be_utf8(given: Listed) -> None:
     (frame,) = given(b"k\xfcche.png\n").frames
     assert bytes(frame.path) == b"k\xfcche.png"
 
@@ -61,7 +64,7 @@ def test_names_need_not_be_utf8(given) -> None:  # type: ignore[no-untyped-def]
         ),
     ],
 )
-def test_lines_that_are_wrong(given, text: str, message: str) -> None:  # type: ignore[no-untyped-def]
+def test_lines_that_are_wrong(given: Listed, text: str, message: str) -> None:
     with pytest.raises(SourceError) as error:
         given(text)
     assert str(error.value) == message
