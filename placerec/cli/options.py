@@ -174,7 +174,9 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
         def read(*args: Any, format_: str, every: int, topic: str | None, labels: Path | None, **options: Any) -> Any:
             from placerec.frames.reading import Reading
 
-            return function(*args, reading=Reading(format_, every, topic, labels), **options)
+            with usage("--labels"):
+                reading = Reading(format_, every, topic, labels)
+            return function(*args, reading=reading, **options)
 
         return read
 

@@ -115,6 +115,9 @@ def _split(
     if not learning:
         raise EvaluationError("every sequence is a test sequence, and none is left to learn from; name others")
     both = [*learning, *testing]
+    if reading.labels and reading.labels.is_file() and sum(sequence.recording is not None for sequence in both) > 1:
+        what = "is one file, and training and test are several recordings"
+        raise SourceError(f"{reading.labels}: {what}; name a folder that holds NAME.labels for each")
     names = unique_names([(own_name(s.source.resolve()), s.source) for s in both], SourceError)
     both = [replace(sequence, name=name) for sequence, name in zip(both, names, strict=True)]
     training, tests = both[: len(learning)], both[len(learning) :]

@@ -55,8 +55,10 @@ class Intervals:
         starts = [one.start for one in self.intervals]
         found = []
         for time in times:
-            k = bisect_right(starts, time - zero) - 1
-            found.append(self.intervals[k].place if k >= 0 and time - zero < self.intervals[k].end else "")
+            # The seconds since 1970 have no more digits than this.
+            seconds = round(time - zero, 6)
+            k = bisect_right(starts, seconds) - 1
+            found.append(self.intervals[k].place if k >= 0 and seconds < self.intervals[k].end else "")
         if not any(found):
             log.warning("%s: labels none of the %d frames", self.path, len(times))
         return found
