@@ -22,6 +22,8 @@ from placerec.frames.sequence import Frame, Gray
 SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".flv", ".ogv", ".3gp", ".mts")
 # Seconds within which two times are one.
 _SAME = 0.0002
+# As many packets in a row that cannot be read are the end.
+_DAMAGED = 1000
 log = logging.getLogger(__name__)
 
 
@@ -64,11 +66,11 @@ def list_times(path: Path) -> "array[float]":
     _check_readable(path)
     with _opened(path, packets=True) as capture:
         # What comes before the start is there for the decoder's sake: it is cut off by the container.
-        times = array("d", sorted(time for time in _walked(capture) if time > -_SAME))
+        times = array("d", sorted(time for time in _walked(path, capture) if time > -_SAME))
     if any(after - before < _SAME for before, after in pairwise(times)):
         # MPEG program streams: not every packet has its time.
         with _opened(path) as capture:
-            times = _increasing(_walked(capture), 1 / (_rate(capture) or 25))
+            times = _increasing(_walked(path, capture), 1 / (_rate(capture) or 25))
     with _opened(path) as capture:
         if not times or not any(_grab(capture) for _ in times):
             codec = _codec(capture)
@@ -83,9 +85,11 @@ def _opened(path: Path, *, packets: bool = False) -> Iterator[Any]:
 
     # FFmpeg writes to stderr unless it is told not to before its first use: what matters is found out and said here.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    # One thread: what several make of damaged H.264 is another picture from run to run.
+    how = [cv2.CAP_PROP_FORMAT, -1] if packets else [cv2.CAP_PROP_N_THREADS, 1]
     with quiet():
         # Absolute: FFmpeg takes a name with a colon for an address.
-        capture = cv2.VideoCapture(os.path.abspath(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1] if packets else [])
+        capture = cv2.VideoCapture(os.path.abspath(path), cv2.CAP_FFMPEG, how)
     try:
         if not capture.isOpened():
             raise SourceError(f"{path}: is no video that OpenCV can read, or has lost its index; remove it")
@@ -94,9 +98,18 @@ def _opened(path: Path, *, packets: bool = False) -> Iterator[Any]:
         capture.release()
 
 
-def _walked(capture: Any) -> Iterator[float]:
-    while _grab(capture):
-        yield round(_seconds(capture), 6)
+def _walked(path: Path, capture: Any) -> Iterator[float]:
+    """The times of all packets or frames that can be read, in the order of the file."""
+    lost = failures = 0
+    while failures < _DAMAGED:
+        if _grab(capture):
+            lost, failures = lost + failures, 0
+            yield round(_seconds(capture), 6)
+        else:
+            # At a damaged packet as well as at the end.
+            failures += 1
+    if lost:
+        log.warning("%s: is damaged: %d packets are passed over", path, lost)
 
 
 def _increasing(found: Iterable[float], step: float) -> "array[float]":
@@ -112,10 +125,9 @@ def _decoded(capture: Any, times: "array[float]", *, late: bool) -> Iterator[tup
 
     `late`: the container (AVI) has times of decoding alone, which B-frames are later than by a constant.
     """
-    done, failures, lag = 0, 0, None
+    done, failures, before, lag = 0, 0, -1.0, None
     while done < len(times) and failures <= len(times) - done:
         if not _grab(capture):
-            # At a packet that cannot be decoded as well as at the end.
             failures += 1
             continue
         failures, seconds = 0, _seconds(capture)
@@ -123,8 +135,11 @@ def _decoded(capture: Any, times: "array[float]", *, late: bool) -> Iterator[tup
             lag = seconds - times[0] if late else 0.0
         found = bisect_left(times, seconds - lag - _SAME)
         if not (done <= found < len(times) and times[found] - (seconds - lag) <= _SAME):
+            if before < seconds < times[done] + lag:
+                continue  # a frame that is not listed, for its packet is damaged
             # A time that makes no sense, as of the last B-frame in MPEG files.
             found = done
+        before = seconds
         yield from ((missing, False) for missing in range(done, found))
         yield found, True
         done = found + 1

@@ -6,6 +6,7 @@ import pickle
 import struct
 import subprocess
 import sys
+from array import array
 from pathlib import Path
 
 import cv2
@@ -17,7 +18,7 @@ from recorded import cut, decoded, pictures, write_video
 from placerec.errors import SourceError
 from placerec.frames import Frame, Reading, Sequence, find_sequences, images_at
 from placerec.frames.sequence import Gray
-from placerec.frames.video import SUFFIXES, list_times
+from placerec.frames.video import SUFFIXES, _decoded, _increasing, _walked, list_times
 
 # A container and a codec; MPEG-2 is written with B-frames, whose order in the file is not that in time.
 KINDS = [
@@ -264,3 +265,42 @@ def test_names_with_signs_of_ffmpeg_are_names(tmp_path: Path, monkeypatch: pytes
         Path(name).write_bytes((tmp_path / "run.avi").read_bytes())
         assert len(list_times(Path(name))) == 3
         assert Path(name).suffix in SUFFIXES
+
+
+class Scripted:
+    """A capture that gives these times in seconds, None where a packet cannot be read; then nothing."""
+
+    def __init__(self, *times: float | None) -> None:
+        self.times, self.now = list(times), 0.0
+
+    def grab(self) -> bool:
+        found = self.times.pop(0) if self.times else None
+        self.now = 0.0 if found is None else found
+        return found is not None
+
+    def get(self, prop: int) -> float:
+        return 1000 * self.now
+
+
+def positions(listed: list[float], *given: float | None, late: bool = False) -> list[tuple[int, bool]]:
+    return list(_decoded(Scripted(*given), array("d", listed), late=late))
+
+
+def test_decoded_frames_are_found_again_by_their_times(caplog: pytest.LogCaptureFixture) -> None:
+    listed = [0.0, 0.1, 0.2, 0.3]
+    read = [(0, True), (1, True), (2, True), (3, True)]
+    assert positions(listed, 0.0, 0.1, 0.2, 0.3) == read
+    # The last B-frame of MPEG files has the time 0; AVI's times are all late by a frame or two.
+    assert positions(listed, 0.0, 0.1, 0.2, 0.0) == read
+    assert positions(listed, 0.2, 0.3, 0.4, 0.0, late=True) == read
+    # Damaged packets: told of by the decoder, or left out in silence; at the start, and at the end.
+    assert positions(listed, 0.0, None, 0.2, 0.3) == [(0, True), (1, False), (2, True), (3, True)]
+    assert positions(listed, 0.2, 0.3) == [(0, False), (1, False), (2, True), (3, True)]
+    assert positions(listed, 0.0, 0.1) == [(0, True), (1, True), (2, False), (3, False)]
+    assert positions(listed) == [(0, False), (1, False), (2, False), (3, False)]
+    # A frame whose packet could not be walked is none of those that are listed.
+    assert positions(listed, 0.0, 0.05, 0.1, 0.15, None, 0.2, 0.3, 0.4) == read
+    caplog.clear()
+    assert list(_walked(Path("x.mp4"), Scripted(0.0, None, None, 0.1))) == [0.0, 0.1]
+    assert caplog.messages == ["x.mp4: is damaged: 2 packets are passed over"]
+    assert _increasing([0.0, 0.1, 0.1, 0.3, 0.0], 0.1).tolist() == [0.0, 0.1, 0.2, 0.3, 0.4]
