@@ -80,8 +80,9 @@ def decode(
 ) -> None:
     """Find the belief over places for every frame.
 
-    TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, images. `-` reads one word a
-    line (or word, tab, seconds, tab, distance) and answers each at once.
+    TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, any SOURCE that tokenize takes:
+    folders of images, videos, bags, lists. `-` without -w reads one word a line (or word, tab, seconds, tab, distance)
+    and answers each at once.
     """
     from placerec.baselines import check_method, load_decoder
     from placerec.baselines import decode as run
@@ -89,11 +90,11 @@ def decode(
 
     with usage("--method"):
         check_method(method, options, scorer=scorer)
-    if tokens == (Path("-"),):
+    if tokens == (Path("-"),) and words is None:
         if options.explain:
             raise click.UsageError("`-` answers on stdout and writes no files: it takes no --explain")
-        if words or out:
-            raise click.UsageError("`-` reads words and answers on stdout: it takes neither -w nor -o")
+        if out:
+            raise click.UsageError("`-` reads words and answers on stdout: it takes no -o")
         if sys.stdin is None:
             raise click.UsageError("`-` reads standard input, and that is closed")
         if options.looks_ahead:
@@ -104,7 +105,7 @@ def decode(
         for line in decode_lines(recognizer, sys.stdin, as_json=as_json):
             click.echo(line)
         return
-    if Path("-") in tokens:
+    if Path("-") in tokens and words is None:
         raise click.UsageError("`-` cannot be mixed with files")
     if options.explain and out is None:
         raise click.UsageError("--explain writes files beside the beliefs: it needs -o")
