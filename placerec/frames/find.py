@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from placerec.errors import SourceError
+from placerec.frames.camera import find_camera
 from placerec.frames.cold import CAMERA, LIST_FOLDER, find_list, parse_name
 from placerec.frames.folder import WANTED, list_folder, read_frames
 from placerec.frames.naming import unique_names
@@ -38,7 +39,10 @@ def find_sequences(sources: Iterable[Path | str], *, reading: Reading = Reading(
     downwards. Raises SourceError for sources without images, labels that cannot be used, a sequence given twice,
     names that stay equal with the parent's name.
     """
-    paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
+    sources = [sources] if isinstance(sources, str | Path) else list(sources)
+    if camera := find_camera(sources):
+        return [camera]
+    paths = [Path(source) for source in sources]
     found = [item for path in paths for item in _in_source(path, reading.format)]
     _check_twice(found)
     names = unique_names([(_absolute(item.folder).name, item.folder) for item in found], SourceError)
