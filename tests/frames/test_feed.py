@@ -68,11 +68,10 @@ def test_an_error_comes_after_the_frames_before_it() -> None:
 
     feed = Feed(broken)
     feed._thread.join()
-    numbers = []
+    iterator = iter(feed)
+    assert next(iterator).number == 0
     with pytest.raises(SourceError, match="the cable is out"):
-        for arrival in feed:
-            numbers.append(arrival.number)
-    assert numbers == [0]
+        next(iterator)
 
 
 def test_stop_ends_the_source_and_the_iteration() -> None:
