@@ -18,6 +18,8 @@ Stopped = Callable[[], bool]
 _NAP = 0.1
 # A camera is given so long to notice that it is stopped; one that hangs is left to its own time limit.
 _PATIENCE = 3.0
+# Whoever interrupts a group of processes may reach each of them twice at once.
+_TWICE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +108,7 @@ def paced(shots: Iterable[tuple[Frame, Gray | str]], stopped: Stopped) -> Iterat
 
 @contextmanager
 def ended_by_interrupt(feed: Feed) -> Iterator[None]:
-    """Within, the first Ctrl-C stops `feed`, and a second one is what it always is.
+    """Within, Ctrl-C stops `feed`; another one, a second later or more, is what it always is.
 
     Only the main thread hears of signals; in another nothing changes. Nor does it where interrupts are ignored.
     """
@@ -114,10 +116,16 @@ def ended_by_interrupt(feed: Feed) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread() or before in (signal.SIG_IGN, None):
         yield
         return
+    since: float | None = None
 
     def stop(number: int, frame: object) -> None:
-        signal.signal(signal.SIGINT, before)
-        feed.stop()
+        nonlocal since
+        if since is None:
+            since = time.monotonic()
+            feed.stop()
+        elif time.monotonic() - since >= _TWICE:
+            signal.signal(signal.SIGINT, before)
+            signal.raise_signal(signal.SIGINT)
 
     signal.signal(signal.SIGINT, stop)
     try:

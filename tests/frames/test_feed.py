@@ -98,41 +98,52 @@ def test_a_source_that_hangs_does_not_keep_anybody() -> None:
     feed.close()
 
 
-def test_the_first_interrupt_ends_the_feed_and_the_second_is_as_ever() -> None:
+@pytest.fixture
+def interrupts() -> Iterator[None]:
+    """Interrupts as Python has them, however this process was started."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with closing(Feed(never_ending)) as feed, ended_by_interrupt(feed):
-            for _ in feed:
-                if feed.seen >= 3:
-                    os.kill(os.getpid(), signal.SIGINT)
-            assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interrupts")
+def test_an_interrupt_ends_the_feed() -> None:
+    with closing(Feed(never_ending)) as feed, ended_by_interrupt(feed):
+        for _ in feed:
+            if feed.seen >= 3:
+                # Twice at once is one.
+                os.kill(os.getpid(), signal.SIGINT)
+                os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("interrupts")
+def test_a_later_interrupt_is_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("placerec.frames.feed._TWICE", 0)
+    with closing(Feed(never_ending)) as feed:
+        with ended_by_interrupt(feed):
+            os.kill(os.getpid(), signal.SIGINT)
+            with pytest.raises(KeyboardInterrupt):
+                os.kill(os.getpid(), signal.SIGINT)
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        with closing(Feed(never_ending)) as feed:
-            with ended_by_interrupt(feed):
-                assert signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-            assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.usefixtures("interrupts")
 def test_ignored_interrupts_stay_ignored_and_other_threads_are_not_told() -> None:
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with closing(Feed(never_ending)) as feed, ended_by_interrupt(feed):
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    seen = []
+
+    def elsewhere() -> None:
         with closing(Feed(never_ending)) as feed, ended_by_interrupt(feed):
-            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        seen = []
+            seen.append(signal.getsignal(signal.SIGINT))
 
-        def elsewhere() -> None:
-            with closing(Feed(never_ending)) as feed, ended_by_interrupt(feed):
-                seen.append(signal.getsignal(signal.SIGINT))
-
-        thread = threading.Thread(target=elsewhere)
-        thread.start()
-        thread.join()
-        assert seen == [signal.default_int_handler]
-    finally:
-        signal.signal(signal.SIGINT, before)
+    thread = threading.Thread(target=elsewhere)
+    thread.start()
+    thread.join()
+    assert seen == [signal.default_int_handler]
 
 
 def test_a_recording_is_played_at_its_own_pace() -> None:
