@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -22,8 +22,13 @@ def jpegs(folder: Path) -> list[bytes]:
 
 
 @contextmanager
-def network_camera(parts: Sequence[bytes], *, wait: float = 0.02, hang: bool = False) -> Iterator[str]:
-    """The address of a camera that sends `parts`, `wait` seconds apart, and hangs up, or is silent from then on."""
+def network_camera(
+    parts: Iterable[bytes], *, wait: float = 0.02, hang: bool = False, over: threading.Event | None = None
+) -> Iterator[str]:
+    """The address of a camera that sends `parts`, `wait` seconds apart, and hangs up, or is silent from then on.
+
+    `over` is set once all are sent.
+    """
     closing = threading.Event()
 
     class Handler(BaseHTTPRequestHandler):
@@ -37,6 +42,8 @@ def network_camera(parts: Sequence[bytes], *, wait: float = 0.02, hang: bool = F
                     if time.monotonic() > end or closing.wait(wait):
                         return
                     self.wfile.write(BOUNDARY % len(part) + part + b"\r\n")
+                if over is not None:
+                    over.set()
                 if hang:
                     closing.wait(LONGEST)
             except OSError:
