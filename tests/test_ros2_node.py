@@ -133,3 +133,8 @@ def test_the_node_publishes_what_the_recognizer_believes(tmp_path: Path, monkeyp
         assert message.data == pytest.approx(belief.tolist())
     assert graph.said[0] == "places: hall, kitchen"
     assert [said.split(":")[0] for said in graph.said] == ["places", "image left out", "image left out"]
+
+
+def test_the_page_shows_the_node_as_it_is() -> None:
+    (block,) = [text for text in (ROOT / "docs/live.md").read_text().split("```") if "class WhichPlace" in text]
+    assert block.removeprefix("python\n") in NODE.read_text()

@@ -5,7 +5,7 @@
 The frames are synthetic (blurred noise, 640 x 480 in colour): the time does not depend on what they show. `picture`:
 a JPEG of that size to grey levels; a camera's own frames are there already. `fit`: to the 128 x 128 that GIST
 describes. `word`: PCA and the nearest unit. `belief`: five places, order 2. `line`: as `decode` writes it. The stages
-take turns frame by frame in one process; medians over all turns.
+take turns frame by frame in one process; medians over all turns, of CPU time.
 """
 
 import statistics
@@ -65,7 +65,7 @@ def make_recognizer(folder: Path, dictionary: Dictionary) -> Recognizer:
 
 def stages(path: Path, dictionary: Dictionary, recognizer: Recognizer) -> list[float]:
     """The seconds that each stage takes for one frame."""
-    clock = time.perf_counter
+    clock = time.thread_time
     moments = [clock()]
     gray: NDArray[np.uint8 | np.float32] = read_gray(path)
     moments.append(clock())
