@@ -112,16 +112,19 @@ def is_camera(source: Path | str) -> bool:
     return str(source).startswith(PREFIX)
 
 
-def find_camera(sources: Iterable[Path | str]) -> Sequence | None:
+def find_camera(sources: Iterable[Path | str], endless: bool) -> Sequence | None:
     """The camera that is the only one of `sources`, None if there is no camera among them.
 
-    Raises SourceError for a camera beside other sources, and for one that is named in no way that can be understood.
+    Raises SourceError for a camera beside other sources, one that is named in no way that can be understood, and any
+    if nothing `endless` will do.
     """
     sources = list(sources)
     cameras = [str(source) for source in sources if is_camera(source)]
     if not cameras:
         return None
     camera = Camera(cameras[0].removeprefix(PREFIX))
+    if not endless:
+        raise SourceError(f"{camera}: a camera is for tokenize and decode alone; make a video with it, and name that")
     if len(sources) > 1:
         raise SourceError(f"{camera}: a camera is read until it is stopped, with nothing beside it; run one at a time")
     if not (camera.source.isdecimal() or camera.source.startswith("/") or re.match(r"\w+://.", camera.source)):

@@ -32,15 +32,18 @@ class _Found:
     place: str = ""
 
 
-def find_sequences(sources: Iterable[Path | str], *, reading: Reading = Reading()) -> list[Sequence]:
+def find_sequences(
+    sources: Iterable[Path | str], *, reading: Reading = Reading(), endless: bool = False
+) -> list[Sequence]:
     """The sequences in `sources`, in the order given, within a source in natural order; no image is opened.
 
     A source is a sequence (COLD's layout, its std_cam/, or a folder of images) or a folder of sequences, searched
-    downwards. Raises SourceError for sources without images, labels that cannot be used, a sequence given twice,
-    names that stay equal with the parent's name.
+    downwards. `endless`: it may be a camera (`find_camera`), whose frames are known as they come. Raises SourceError
+    for sources without images, labels that cannot be used, a sequence given twice, names that stay equal with the
+    parent's name.
     """
     sources = [sources] if isinstance(sources, str | Path) else list(sources)
-    if camera := find_camera(sources):
+    if camera := find_camera(sources, endless):
         return [camera]
     paths = [Path(source) for source in sources]
     found = [item for path in paths for item in _in_source(path, reading.format)]

@@ -89,7 +89,7 @@ def decode_live(
         raise StreamError(f"{source}: is a token stream, and live decoding is of images; name a camera or a video")
     dictionary = Dictionary.load(words)
     decoder = make(load_model(model), options=options, scorer=scorer, dictionary=dictionary)
-    sequences = find_sequences([source], reading=reading)
+    sequences = find_sequences([source], reading=reading, endless=True)
     if len(sequences) > 1:
         raise StreamError(f"{source}: holds {len(sequences)} sequences; name one of them to be played live")
     header = None if as_json else format_header(decoder.places, unknown=decoder.unknown is not None)

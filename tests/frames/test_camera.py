@@ -35,13 +35,13 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
 )
 def test_the_name_of_a_camera(source: str, name: str) -> None:
     assert is_camera(source)
-    (sequence,) = find_sequences([source])
+    (sequence,) = find_sequences([source], endless=True)
     assert (sequence.name, list(sequence.frames)) == (name, [])
     assert sequence.recording is not None
     assert sequence.recording.endless
     assert sequence.recording.files() == []
     assert "secret" not in f"{sequence.recording}{sequence.source}"
-    assert find_sequences(source)[0].name == name
+    assert find_sequences(source, endless=True)[0].name == name
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,12 @@ def test_the_name_of_a_camera(source: str, name: str) -> None:
 )
 def test_what_is_no_camera(sources: list[str | Path], message: str) -> None:
     with pytest.raises(SourceError, match=message):
-        find_sequences(sources)
+        find_sequences(sources, endless=True)
+
+
+def test_what_needs_frames_again_takes_no_camera() -> None:
+    with pytest.raises(SourceError, match="camera:0: a camera is for tokenize and decode alone; make a video with it"):
+        find_sequences(["camera:0"])
 
 
 DEVICES = [
