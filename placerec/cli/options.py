@@ -28,6 +28,8 @@ class PathType(click.Path):
             self.fail("the path is empty", param, ctx)
         if str(value) == "-" and not self.allow_dash:
             self.fail("`-` is no stream here; name a path", param, ctx)
+        if str(value).startswith("camera:") and isinstance(param, click.Argument):
+            return value  # No path: one would lose a slash of the address.
         return super().convert(value, param, ctx)
 
 

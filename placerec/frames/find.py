@@ -10,6 +10,7 @@ from pathlib import Path
 from placerec.errors import SourceError
 from placerec.frames import idol, image_list, vpc
 from placerec.frames.bag import is_bag
+from placerec.frames.camera import find_camera
 from placerec.frames.cold import CAMERA, LIST_FOLDER, find_list
 from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames, stamp
 from placerec.frames.intervals import find_intervals
@@ -41,15 +42,21 @@ class _Found:
     place: str = ""
 
 
-def find_sequences(sources: Iterable[Path | str], *, reading: Reading = Reading()) -> list[Sequence]:
+def find_sequences(
+    sources: Iterable[Path | str], *, reading: Reading = Reading(), endless: bool = False
+) -> list[Sequence]:
     """The sequences in `sources`, in the order given, within a source in natural order; no image is decoded.
 
     A source is a sequence (the layout of COLD, KTH-IDOL2 or VPC, or a folder of images; a video, a bag), a folder of
-    sequences, searched downwards, or `-`: a list of image files on standard input. Raises SourceError for sources
-    without images, labels that cannot be used, a sequence given twice, names that stay equal with the parent's name,
-    and MissingExtraError for a bag without rosbags.
+    sequences, searched downwards, or `-`: a list of image files on standard input. `endless`: it may be a camera
+    (`find_camera`), whose frames are known as they come. Raises SourceError for sources without images, labels that
+    cannot be used, a sequence given twice, names that stay equal with the parent's name, and MissingExtraError for a
+    bag without rosbags.
     """
-    paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
+    sources = [sources] if isinstance(sources, str | Path) else list(sources)
+    if camera := find_camera(sources, endless):
+        return [camera]
+    paths = [Path(source) for source in sources]
     found = [item for path in paths for item in _in_source(path, reading.format)]
     _check_twice(found)
     _tell_unused(found, reading)

@@ -110,7 +110,7 @@ def _parts(
     progress: Progress | None,
 ) -> Iterator[WordStream]:
     """Pieces of the token streams, those of a sequence one after the other."""
-    sequences = find_sequences(sources, reading=reading)
+    sequences = find_sequences(sources, reading=reading, endless=True)
     names = set()
     if matrix is not None:
         parts = iter(tokens_of(describe(sequences, dictionary.spec, matrix=matrix), dictionary))
