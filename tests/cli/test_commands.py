@@ -316,7 +316,7 @@ def test_decode_streams(world: Path) -> None:
         "warning: <stdin>: lines skipped because the models do not list their word: 2",
     ]
     assert done("decode", "-", *model, stdin="").stdout.count("\n") == 1
-    misused("it takes no -o", "decode", "-", *model, "-o", world / "no")
+    misused("it takes neither -o nor --explain", "decode", "-", *model, "-o", world / "no")
     misused("`-` cannot be mixed with files", "decode", "-", world / "tokens", *model)
 
 

@@ -214,7 +214,7 @@ def test_sequences_that_nothing_can_be_compared_on_are_refused(runs: Path, tmp_p
         compare([runs], [bare], tmp_path / "out")
     with pytest.raises(EvaluationError, match="name 0 places"):
         compare([bare], [runs / "run0"], tmp_path / "out")
-    with pytest.raises(PlacerecError, match="no such folder"):
+    with pytest.raises(PlacerecError, match="no such file or folder"):
         compare([runs], [runs / "run9"], tmp_path / "out")
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(OutputError, match="cannot be written"):
