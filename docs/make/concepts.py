@@ -114,7 +114,7 @@ def sentences() -> str:
 
 def ngrams(model: Model) -> str:
     """What follows w1 in the kitchen."""
-    parts = [text(10, 44, "the kitchen's sentences:", at="start", colour=GREY)]
+    parts = [text(10, 44, "kitchen's sentences:", at="start", colour=GREY)]
     shown = [words for drive in DRIVES for place, words in drive if place == KITCHEN]
     parts += [
         text(10, 92 + 44 * i, words, at="start", size=32, colour=COLOURS[KITCHEN]) for i, words in enumerate(shown)

@@ -1,4 +1,4 @@
-"""Hooks of .mkdocs.yml: what pages link to outside docs/ becomes part of the site, and no page of docs/ is left out.
+"""Hooks of .mkdocs.yml: programs and files outside docs/ that pages link to get pages, too, and no page is left out.
 
 On GitHub such a link leads to the file itself. In the site `../arpa_models/README.md` is a page; a text that is not
 Markdown gets a page that shows it, a folder one that shows its texts; `../README.md` is the first page.
@@ -50,13 +50,15 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 
 
 def outside(source: str, link: str, root: Path) -> str | None:
-    """The path, from the repository's root, of an existing file outside docs/ that a link leads to; else None."""
+    """The path, from the repository's root, of the program, or the file outside docs/, that a link leads to."""
     target = os.path.normpath(Path(source).parent / link)
-    return None if target.startswith(("docs/", "..")) or not (root / target).exists() else target
+    served = target.startswith("docs/") and not target.endswith(".py")
+    return None if served or target.startswith("..") or not (root / target).exists() else target
 
 
 def page_of(target: str) -> str:
     """The page that shows a file."""
+    target = target.removeprefix("docs/")
     return "index.md" if target == "README.md" else target if target.endswith(".md") else f"{target}.md"
 
 
