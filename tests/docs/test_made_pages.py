@@ -11,7 +11,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 METHOD = (DOCS / "method.md").read_text(encoding="utf-8")
-NAMED = sorted(set(re.findall(r"`(placerec(?:\.\w+)+)`", METHOD)))
+ROOMS = sorted(path.stem for path in (ROOT / "placerec").iterdir() if not path.stem.startswith("_"))
+NAMED = sorted(set(re.findall(rf"`((?:{'|'.join(ROOMS)})(?:\.[a-zA-Z_]\w+)+)`", METHOD)) - {"model.json"})
 READING = re.compile(r"\bA(\d+)\b")
 
 
@@ -45,7 +46,7 @@ def test_the_method_page_names_functions() -> None:
 
 @pytest.mark.parametrize("name", NAMED)
 def test_what_the_method_page_names_exists(name: str) -> None:
-    module, inside = name, list[str]()
+    module, inside = f"placerec.{name}", list[str]()
     while not (ROOT / module.replace(".", "/")).with_suffix(".py").exists():
         module, _, last = module.rpartition(".")
         inside.insert(0, last)
