@@ -1,12 +1,15 @@
 """Pages and pictures that programs make are current, and what the paper's page names is there."""
 
 import re
+import runpy
 import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
 
 import pytest
+
+from placerec.reference import backed_off
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -31,6 +34,16 @@ def test_the_pictures_of_the_concepts_are_current(tmp_path: Path) -> None:
     assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == kept
     page = (DOCS / "concepts.md").read_text(encoding="utf-8")
     assert sorted(re.findall(r"\(concepts/(\w+\.svg)\)", page)) == sorted(kept)
+
+
+def test_the_concepts_page_says_what_the_example_computes() -> None:
+    models = runpy.run_path(str(DOCS / "make/concepts.py"))["models"]()
+    alone, after = (
+        backed_off(models["kitchen"], "w2", history) / backed_off(models["corridor"], "w2", history)
+        for history in ((), ("w1",))
+    )
+    page = (DOCS / "concepts.md").read_text(encoding="utf-8")
+    assert f"alone it speaks for the kitchen {alone:.1f} to 1, after `w1` {after:.1f} to 1" in page
 
 
 def test_letters_of_the_pictures_can_be_read_at_half_their_size() -> None:

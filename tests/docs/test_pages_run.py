@@ -89,6 +89,15 @@ def test_no_command_of_a_page_that_should_work_fails(ran: dict[str, Ran]) -> Non
         assert "Traceback" not in ran[name].page
 
 
+def test_the_tutorials_accuracy_is_told_where_others_are_compared_with_it(ran: dict[str, Ran]) -> None:
+    told = re.search(
+        r"the tutorial's words .* give ([\d.]+) %.*, and always answering \*corridor\* ([\d.]+) %", ran["extend"].page
+    )
+    assert told is not None
+    line = f"accuracy           {told[1]} %   (majority class, always 'CR-B': {told[2]} %)"
+    assert ran["tutorial"].page.count(line) == 1
+
+
 def test_every_error_that_is_shown_is_one_line_of_placerec(ran: dict[str, Ran]) -> None:
     page = ran["troubleshooting"].page
     assert page.count("\nplacerec: ") >= 15

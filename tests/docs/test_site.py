@@ -120,6 +120,12 @@ def test_links_between_the_files_themselves_lead_to_files(page: Path) -> None:
             assert (page.parent / unquote(parts.path)).exists(), link
 
 
+def test_no_docstring_is_taken_for_html(site: Path) -> None:
+    text = (site / "library.html").read_text(encoding="utf-8")
+    assert "&lt;unk&gt;" in text
+    assert re.findall(r"<(?:s|unk)>", text) == []
+
+
 def test_the_library_page_has_every_public_name_once() -> None:
     import placerec
 
