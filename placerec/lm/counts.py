@@ -41,8 +41,8 @@ def count_ngrams(
 ) -> NgramCounts:
     """Count the n-grams of orders 1..`order` in sentences of words.
 
-    With `markers`, every sentence is counted between <s> and </s>. With `vocabulary` the vocabulary is closed: other
-    words are counted as <unk>. No n-gram spans two sentences. The semantics are those of ngram-count
+    With `markers`, every sentence is counted between `<s>` and `</s>`. With `vocabulary` it is closed: other
+    words are counted as `<unk>`. No n-gram spans two sentences. The semantics are those of ngram-count
     (sections 3 and 4 of our SRILM specification). The sentences may be more than memory holds; OutputError if they
     are, and a temporary file cannot be written.
     """

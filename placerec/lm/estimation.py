@@ -28,7 +28,7 @@ def estimate(
     """The back-off model of `counts` under `smoothing` (see `placerec.lm.smoothing`).
 
     `min_count`: n-grams of order n seen less than `min_count[n-1]` times are left out, the last entry repeats.
-    `non_events`: words that are never predicted (but may be context), beside <s>; <unk> is one unless
+    `non_events`: words that are never predicted (but may be context), beside `<s>`; `<unk>` is one unless
     `open_vocabulary`. Raises LanguageModelError if no word is left to predict.
     """
     if any(m < 1 for m in min_count) or not min_count:
