@@ -6,11 +6,10 @@ Text is handled as bytes kept in str (Latin-1), so that no byte is lost and word
 import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from io import BytesIO
-from pathlib import Path
 from typing import BinaryIO, TypeVar, cast
 
 from placerec.errors import PlacerecError
@@ -59,7 +58,7 @@ class Streams:
         with _named(name):
             path = _path(name)
             suffix = _packing(name)
-            if not suffix or (path.is_file() and not _is_packed(path, suffix)):
+            if not suffix or (os.path.isfile(path) and not _is_packed(path, suffix)):
                 return open(path, "rb")
             return _unpacking(path, suffix)
 
@@ -85,14 +84,15 @@ class Streams:
             yield self.stdout
             return
         with _named(name), ExitStack() as stack:
-            path = _path(name).resolve()
+            path = os.path.realpath(_path(name))
             suffix = _packing(name)
+            folder, base = os.path.split(path)
             # A device or a pipe has to be written itself; so has a file in a folder that takes no other.
-            direct = path.exists() and not (path.is_file() and os.access(path.parent, os.W_OK))
-            partial = path if direct else path.with_name(f".{path.name}.partial-{os.getpid()}")
+            direct = os.path.exists(path) and not (os.path.isfile(path) and os.access(folder, os.W_OK))
+            partial = path if direct else os.path.join(folder, f".{base}.partial-{os.getpid()}")
             file: BinaryIO = stack.enter_context(open(partial, "wb"))
             if not direct:
-                stack.callback(partial.unlink, missing_ok=True)
+                stack.callback(_remove, partial)
             if suffix:
                 with _packing_into(file, suffix) as packed:
                     yield packed
@@ -100,7 +100,7 @@ class Streams:
                 yield file
             file.close()
             if not direct:
-                partial.replace(path)
+                os.replace(partial, path)
 
     def write(self, name: str, text: str) -> None:
         """Write a file whole, as `output` does."""
@@ -206,8 +206,13 @@ def exit_status(tool: _Tool) -> _Tool:
     return cast(_Tool, run)
 
 
-def _path(name: str) -> Path:
-    return Path(os.fsdecode(name.encode("latin-1")))
+def _path(name: str) -> str:
+    return os.fsdecode(name.encode("latin-1"))
+
+
+def _remove(path: str) -> None:
+    with suppress(FileNotFoundError):
+        os.unlink(path)
 
 
 def _packing(name: str) -> str:
@@ -227,12 +232,12 @@ def _named(name: str) -> Iterator[None]:
         raise SrilmError(f"{name}: {getattr(error, 'strerror', None) or error}") from error
 
 
-def _is_packed(path: Path, suffix: str) -> bool:
+def _is_packed(path: str, suffix: str) -> bool:
     with open(path, "rb") as file:
         return file.read(len(_PACKERS[suffix])) == _PACKERS[suffix]
 
 
-def _unpacking(path: Path, suffix: str) -> BinaryIO:
+def _unpacking(path: str, suffix: str) -> BinaryIO:
     from bz2 import BZ2File
     from gzip import GzipFile
 
