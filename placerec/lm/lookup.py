@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Mask, Singles
+from placerec.lm.logs import Ints, Mask, Singles
 from placerec.lm.row_index import RowIndex
-from placerec.lm.trie import Ints
 
 
 class Entries(NamedTuple):

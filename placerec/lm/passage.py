@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from placerec.lm.logs import Mask, Singles
+from placerec.lm.logs import Ints, Mask, Singles
 from placerec.lm.row_index import RowIndex
-from placerec.lm.trie import Ints
 
 if TYPE_CHECKING:
     from placerec.lm.draft import Draft

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.lm.backoff import BackoffModel, score_ids
-from placerec.lm.logs import EPSILON, LN10, Floats, Mask, Singles
+from placerec.lm.logs import EPSILON, LN10, Floats, Ints, Mask, Singles
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
-from placerec.lm.trie import Ints
 
 TOP_RANKS = (1, 5, 10)
 

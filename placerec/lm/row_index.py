@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints
 
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)
 _SLOTS_PER_KEY = 4

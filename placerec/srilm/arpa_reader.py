@@ -5,8 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from placerec.lm.logs import Mask
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints, Mask
 from placerec.srilm.arpa_block import LOG_ZERO, Block, parse_block
 from placerec.srilm.fields import Fields, NameTable
 from placerec.srilm.options import bounded_int, leading_float

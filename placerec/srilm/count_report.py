@@ -4,11 +4,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from placerec.lm.logs import Floats, p_of
+from placerec.lm.logs import Floats, Ints, p_of
 from placerec.lm.markers import SENTENCE_END
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals
-from placerec.lm.trie import Ints
 from placerec.srilm.counts_file import MALFORMED, MOST_TOKENS, parse_count
 from placerec.srilm.report import RANKS, TOKENS, Printer, block
 from placerec.srilm.scorers import ModelView, Scorer

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints
 
 Packed = NDArray[np.uint64]
 SHORT_NAME, LONGEST_NAME = 8, 16

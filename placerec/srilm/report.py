@@ -6,10 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Mask, p_of
+from placerec.lm.logs import Floats, Ints, Mask, p_of
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
-from placerec.lm.trie import Ints
 from placerec.srilm.scorers import Scored, Scorer, View, event_numbers
 from placerec.srilm.sentences import Handling, Sentences, joined, mark, read_sentences
 from placerec.srilm.streams import Streams

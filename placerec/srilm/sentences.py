@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Mask
+from placerec.lm.logs import Floats, Ints, Mask
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage
-from placerec.lm.trie import Ints
 from placerec.srilm.fields import PADDING, NameTable, split_lines, with_odd_bytes, without_comments
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import Lines, Streams, tokens

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
 from placerec.lm.draft import Draft, drafts_of
 from placerec.lm.gather import trie_of
+from placerec.lm.logs import Ints
 from placerec.lm.passage import (
     Passage,
     answers,
@@ -20,7 +21,7 @@ from placerec.lm.passage import (
     used_context,
 )
 from placerec.lm.row_index import RowIndex
-from placerec.lm.trie import Ints, Vocabulary, build_trie, endings
+from placerec.lm.trie import Vocabulary, build_trie, endings
 
 texts = st.lists(st.lists(st.sampled_from("abcd"), min_size=1, max_size=8), min_size=1, max_size=5)
 
