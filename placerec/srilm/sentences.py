@@ -1,7 +1,6 @@
 """The text that `ngram -ppl` scores: lines to word numbers, with the markers that belong around them (section 10.1)."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +19,7 @@ _NOTHING = -2
 _BLOCK, _BATCH = 1 << 19, 1 << 18
 
 
-@dataclass(frozen=True)
-class Handling:
+class Handling(NamedTuple):
     """What is done to sentences: which markers are put around them, words that are left out, and more.
 
     `weight`: where a line's weight stands (`first`, `last`, or nowhere); `escape`: the start of lines that are copied;

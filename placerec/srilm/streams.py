@@ -7,7 +7,6 @@ import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from io import BytesIO
 from typing import BinaryIO, TypeVar, cast
@@ -32,14 +31,12 @@ class SrilmError(PlacerecError):
         self.status = status
 
 
-@dataclass
 class Streams:
     """Standard input, output and error of one run, and whether `-` was read or written before."""
 
-    stdin: BinaryIO
-    stdout: BinaryIO
-    stderr: BinaryIO
-    used: set[str] = field(default_factory=set)
+    def __init__(self, stdin: BinaryIO, stdout: BinaryIO, stderr: BinaryIO) -> None:
+        self.stdin, self.stdout, self.stderr = stdin, stdout, stderr
+        self.used: set[str] = set()
 
     def say(self, message: str) -> None:
         """A line on standard error, at once."""
