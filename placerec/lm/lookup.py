@@ -60,7 +60,7 @@ class Lookup(NamedTuple):
         """log10 p float32 (T,) of words after contexts, and the length (T,) of the n-gram that answers, 0 for none."""
         order, base = len(self.tables), self.V + 1
         row = self.tables[-1].rows.find(contexts[-1] * base + digits)
-        log10_p, answered = self.tables[-1].log10_p[row], np.full(len(digits), order)
+        log10_p, answered = self.tables[-1].log10_p.take(row, mode="wrap"), np.full(len(digits), order, np.int8)
         left = np.flatnonzero(row < 0)
         unanswered = [left]
         for n in range(order - 1, 0, -1):
