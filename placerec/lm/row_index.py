@@ -7,10 +7,12 @@ from placerec.lm.logs import Ints
 
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)
 _SLOTS_PER_KEY = 4
+# Few keys are given more room: it is cheap, and fewer of them are after the same slot.
+_ROOMY_BITS, _ROOMY = 15, 32
 
 
 class RowIndex:
-    """Finds the places of numbers in `keys`, int64 (m,) >= 0; `distinct`: none of them is there twice.
+    """Finds the places of numbers in `keys`, int64 (m,); `distinct`: none of them is there twice.
 
     A number's hash is the number times an odd factor, so that no two have the same. Its high bits are the number of a
     slot; there, the others are kept above the place of the key: one look is enough to find and to compare.
@@ -18,7 +20,8 @@ class RowIndex:
 
     def __init__(self, keys: Ints) -> None:
         self._size = len(keys)
-        bits = max(8, (_SLOTS_PER_KEY * self._size).bit_length())
+        least, roomy = ((slots * self._size).bit_length() for slots in (_SLOTS_PER_KEY, _ROOMY))
+        bits = max(8, least, min(roomy, _ROOMY_BITS))
         self._shift, self._width = np.uint64(64 - bits), np.uint64(bits)
         # A free slot holds a place that there is not.
         self._slots = np.full(1 << bits, (1 << bits) - 1, np.uint64)

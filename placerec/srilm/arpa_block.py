@@ -104,7 +104,7 @@ def _short_decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     start += negative
     size = fields.lengths[at] - negative - 2
     whole = bytes_[start] - np.uint8(ord("0"))
-    digits, plain = _eight_digits(fields.eights.take(start + 2), _FILLED[np.clip(size, 0, 8)])
+    digits, plain = _eight_digits(fields.eights[start + 2], _FILLED[np.clip(size, 0, 8)])
     plain &= (whole <= 9) & (bytes_[start + 1] == _POINT) & (size >= 0) & (size <= 8)
     # Both are exact, so that the quotient is the float64 nearest to the decimal number.
     value = (whole * np.int64(10**8) + digits) / 1e8
