@@ -7,8 +7,7 @@ import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cached_property, wraps
-from io import BytesIO
+from functools import wraps
 from typing import BinaryIO, TypeVar, cast
 
 from placerec.errors import PlacerecError
@@ -118,8 +117,7 @@ class Streams:
 class Lines:
     """Iterates over the lines of a file that are neither blank nor comments; `number` is that of the last line read.
 
-    A line is read when it is asked for. `data` is the whole file, and `blocks` are its parts, for those who take it
-    apart themselves.
+    A line is read when it is asked for. `blocks` are the file's parts, for those who take it apart themselves.
     """
 
     def __init__(self, name: str, source: BinaryIO, streams: Streams) -> None:
@@ -127,12 +125,6 @@ class Lines:
         self.number = 0
         self.source = source
         self.streams = streams
-
-    @cached_property
-    def data(self) -> bytes:
-        """All bytes, without a byte-order mark."""
-        with _named(self.name), self.streams.closing(self.source):
-            return self._unmarked(self.source.read())
 
     def _unmarked(self, start: bytes) -> bytes:
         encoding = _OTHER_MARKS.get(start[:2])
@@ -142,9 +134,6 @@ class Lines:
         return start.removeprefix(_BYTE_ORDER_MARK)
 
     def _physical(self) -> Iterator[bytes]:
-        if "data" in self.__dict__:
-            yield from BytesIO(self.data)
-            return
         first = self._unmarked(self.source.readline())
         if first:
             yield first
