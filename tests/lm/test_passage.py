@@ -92,14 +92,26 @@ def test_joint_probabilities_of_recent_words() -> None:
     assert of_rows[rows[0]] == pytest.approx(model.log10_p("a") + model.log10_p("b", ["a"]))
 
 
+whole_numbers = st.integers(0, 9) | st.integers(-(2**63), 2**63 - 1)
+
+
 @settings(max_examples=50, deadline=None)
-@given(st.sets(st.integers(0, 2**62), max_size=300), st.lists(st.integers(0, 2**62), max_size=50))
-def test_an_index_finds_what_is_there_and_nothing_else(keys: set[int], others: list[int]) -> None:
-    listed = np.array(sorted(keys), np.int64)
-    index = RowIndex(listed)
-    assert index.find(listed).tolist() == list(range(len(listed)))
-    places = {key: place for place, key in enumerate(listed.tolist())}
-    assert index.find(np.array(others, np.int64)).tolist() == [places.get(key, -1) for key in others]
+@given(st.lists(whole_numbers, max_size=300), st.lists(whole_numbers, max_size=50))
+def test_an_index_finds_what_is_there_and_nothing_else(keys: list[int], others: list[int]) -> None:
+    index = RowIndex(np.array(keys, np.int64))
+    assert [keys[place] for place in index.find(np.array(keys, np.int64)).tolist()] == keys
+    found = index.find(np.array(others, np.int64)).tolist()
+    assert all(keys[place] == key if key in keys else place == -1 for key, place in zip(others, found, strict=True))
+    assert index.distinct == (len(set(keys)) == len(keys))
+
+
+def test_an_index_of_many_numbers_finds_each() -> None:
+    keys = np.random.default_rng(0).permutation(100_000) * 7919
+    index = RowIndex(keys)
+    assert index.distinct
+    np.testing.assert_array_equal(index.find(keys), np.arange(len(keys)))
+    assert (index.find(keys + 1) == -1).all()
+    assert not RowIndex(np.append(keys, keys[:1])).distinct
 
 
 @settings(max_examples=50, deadline=None)
