@@ -69,11 +69,13 @@ def split_lines(data: bytes, size: int) -> tuple[Fields, Ints]:
 
 def _single_blanks(data: bytes, at: Ints, kind: NDArray[np.uint8]) -> tuple[Fields, Ints] | None:
     """The same where one separator stands behind every field, as programs write lines; `kind` (f,) `at` places (f,)."""
-    lengths = np.diff(at, prepend=-1) - 1
+    starts = np.zeros(len(at), np.int64)
+    np.add(at[:-1], 1, out=starts[1:])
+    lengths = at - starts
     line_end = kind == _LINE_END
     if (lengths == 0).any() or not (line_end | (kind == _BLANK) | (kind == _TAB)).all():
         return None
-    return Fields(data, at - lengths, lengths), np.diff(np.flatnonzero(line_end), prepend=-1)
+    return Fields(data, starts, lengths), np.diff(np.flatnonzero(line_end), prepend=-1)
 
 
 def _any_blanks(data: bytes, buffer: NDArray[np.uint8]) -> tuple[Fields, Ints]:
@@ -120,7 +122,7 @@ class NameTable:
     def find(self, fields: Fields, at: Ints | slice) -> Ints:
         """The numbers of the fields `at` (m,), -1 for a name that is not listed."""
         start, length = fields.starts[at], fields.lengths[at]
-        # Of a longer name this is the start. `take` copies them all beforehand, which pays where many are asked for.
+        # Of a longer name this is the start. `take` copies them all beforehand, which pays where most are asked for.
         name = fields.eights.take(start)
         name &= _FILLED.take(length, mode="clip")
         number = self.short_numbers[self.short.find(name.view(np.int64))]
