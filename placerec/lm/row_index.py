@@ -26,16 +26,16 @@ class RowIndex:
         # A free slot holds a place that there is not.
         self._slots = np.full(1 << bits, (1 << bits) - 1, np.uint64)
         slot, above = self._hashed(keys)
-        places = np.arange(self._size)
-        # Of several keys for one slot the last is kept; those that lost it go to a table of their own.
-        self._slots[slot] = above | places.view(np.uint64)
-        kept = (self._slots[slot] ^ above).view(np.int64)
-        self._lost = np.flatnonzero(kept != places)
+        places = np.arange(self._size).view(np.uint64)
+        # Of several keys for one slot the last is kept; the others, but for its equals, go to a table of their own.
+        self._slots[slot] = above | places
+        kept = self._slots[slot] ^ above
+        self._lost = np.flatnonzero(kept >= self._size)
         self._contested = np.zeros(1 << bits, bool)
         self._contested[slot[self._lost]] = True
         self._rest = RowIndex(keys[self._lost]) if len(self._lost) else None
-        again = bool((kept[self._lost].view(np.uint64) < self._size).any())
-        self.distinct: bool = not again and (self._rest is None or self._rest.distinct)
+        self.distinct: bool = np.count_nonzero(kept != places) == len(self._lost)
+        self.distinct &= self._rest is None or self._rest.distinct
 
     def _hashed(self, keys: Ints) -> tuple[Ints, NDArray[np.uint64]]:
         mixed = keys.view(np.uint64) * _FACTOR

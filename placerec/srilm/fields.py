@@ -114,7 +114,7 @@ class NameTable:
         numbers = np.array([number for _, number in named], np.int64)
         long = packed[:, 1] > 0
         self.short = RowIndex(packed[~long, 0].view(np.int64))
-        self.halves = RowIndex(np.unique(packed[long]).view(np.int64))
+        self.halves = RowIndex(packed[long].ravel().view(np.int64))
         self.long = RowIndex(self._pairs(packed[long, 0], packed[long, 1]))
         # At the end, what is found for a name that is not listed.
         self.short_numbers, self.long_numbers = np.append(numbers[~long], -1), np.append(numbers[long], -1)
@@ -125,7 +125,7 @@ class NameTable:
         # Of a longer name this is the start. `take` copies them all beforehand, which pays where most are asked for.
         name = fields.eights.take(start)
         name &= _FILLED.take(length, mode="clip")
-        number = self.short_numbers[self.short.find(name.view(np.int64))]
+        number = self.short_numbers.take(self.short.find(name.view(np.int64)), mode="wrap")
         long = np.flatnonzero(length > SHORT_NAME)
         if len(long):
             number[long] = self._find_long(fields, np.arange(len(fields.starts))[at][long])

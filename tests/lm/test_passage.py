@@ -114,6 +114,12 @@ def test_an_index_of_many_numbers_finds_each() -> None:
     assert not RowIndex(np.append(keys, keys[:1])).distinct
 
 
+def test_an_index_of_one_number_many_times_finds_it() -> None:
+    index = RowIndex(np.full(5000, 7))
+    assert not index.distinct
+    assert index.find(np.array([7, 8])).tolist() in [[place, -1] for place in range(5000)]
+
+
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.lists(st.integers(0, 4), min_size=1, max_size=4), max_size=20))
 def test_gathering_lists_prefixes_and_endings(ngrams: list[list[int]]) -> None:
