@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from placerec.lm.logs import Ints
 
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)
-_SLOTS_PER_KEY = 4
-# Few keys are given more room: it is cheap, and fewer of them are after the same slot.
-_ROOMY_BITS, _ROOMY = 15, 32
+_SLOTS_PER_KEY = 2
+# Few keys are given more room: their table still is in a cache, and fewer of them are after the same slot.
+_ROOMY_BITS, _ROOMY = 19, 4
 
 
 class RowIndex:
