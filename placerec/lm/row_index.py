@@ -6,9 +6,8 @@ from numpy.typing import NDArray
 from placerec.lm.logs import Ints
 
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)
-_SLOTS_PER_KEY = 2
-# Few keys are given more room: their table still is in a cache, and fewer of them are after the same slot.
-_ROOMY_BITS, _ROOMY = 19, 4
+# Slots for each key, up to so many bits: where that is still in a cache, more room leaves fewer keys to one slot.
+_ROOM = (2, 64), (4, 19), (32, 15)
 
 
 class RowIndex:
@@ -20,8 +19,7 @@ class RowIndex:
 
     def __init__(self, keys: Ints) -> None:
         self._size = len(keys)
-        least, roomy = ((slots * self._size).bit_length() for slots in (_SLOTS_PER_KEY, _ROOMY))
-        bits = max(8, least, min(roomy, _ROOMY_BITS))
+        bits = max(8, *(min((slots * self._size).bit_length(), most) for slots, most in _ROOM))
         self._shift, self._width = np.uint64(64 - bits), np.uint64(bits)
         # A free slot holds a place that there is not.
         self._slots = np.full(1 << bits, (1 << bits) - 1, np.uint64)
