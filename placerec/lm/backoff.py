@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Singles
-from placerec.lm.trie import Ints, Trie
+from placerec.lm.logs import Ints, Singles
+from placerec.lm.trie import Trie
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import Mask, NgramCounts
 from placerec.lm.discounts import Context, Floats, Rule
 from placerec.lm.draft import Draft, insert_prefixes, weigh_contexts
-from placerec.lm.logs import EPSILON, Singles, log10, p_of
+from placerec.lm.logs import EPSILON, Ints, Singles, log10, p_of
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import Smoothing
 from placerec.lm.trace import SILENT, Trace
-from placerec.lm.trie import Ints, Trie, per_context, runs
+from placerec.lm.trie import Trie, per_context, runs
 
 
 def estimate(
