@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from placerec.vision.pca import project
 from placerec.vision.som import best_units
 
 _NAME_WIDTH = 32
+# Pixels, the longer side of the typical frame of a unit; a picture shows it with half as many at most.
+PREVIEW = 640
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +148,17 @@ def typical_images(
         for k, image in zip(chosen, images_at(sequence, chosen), strict=True):
             if isinstance(image, str):
                 raise SourceError(image)
-            found[unit_of[sequence.name, sequence.frames[k].name]] = image
+            found[unit_of[sequence.name, sequence.frames[k].name]] = _preview(image)
     return found
+
+
+def _preview(image: Gray) -> Gray:
+    """The image, made smaller if it is large: as many of a film would not fit into memory."""
+    import cv2
+
+    scale = PREVIEW / max(image.shape)
+    size = max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale))
+    return image if scale >= 1 else cast(Gray, cv2.resize(image, size, interpolation=cv2.INTER_AREA))
 
 
 def u_matrix(codebook: NDArray[np.float32]) -> NDArray[np.float64]:

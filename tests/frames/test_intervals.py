@@ -1,6 +1,9 @@
 """NAME.labels: which frames of a recording get which place, where the file is looked for, and what is wrong in it."""
 
 import logging
+import re
+import tempfile
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -144,6 +147,21 @@ def test_places_that_differ_only_in_case_are_twins_of_those_of_images(tmp_path: 
 )
 def test_what_is_wrong_in_a_file(tmp_path: Path, text: str, message: str) -> None:
     assert failure(text, tmp_path) == message
+
+
+@given(st.text(alphabet="0123456789.-e# \tab/\r\n\x00\ufeff", max_size=60))
+def test_any_text_is_read_or_refused_by_file_and_line(text: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "x.labels")
+        path.write_text(text, encoding="utf-8", newline="")
+        found: tuple[Interval, ...] = ()
+        said = f"{path}:1: "
+        try:
+            found = read_intervals(path).intervals
+        except SourceError as error:
+            said = str(error)
+        assert re.match(rf"{re.escape(str(path))}:\d+: [^\n]*$", said)
+        assert all(before.end <= one.start for before, one in pairwise(found))
 
 
 def test_an_empty_file_labels_nothing(tmp_path: Path) -> None:

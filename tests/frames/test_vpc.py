@@ -1,9 +1,13 @@
 """VPC's layout: ranges of image numbers in HOME/label.txt, floors as sequences; and the real labels of six homes."""
 
+import re
+import tempfile
 from collections import Counter
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from placerec.errors import SourceError
 from placerec.frames import find_sequences
@@ -93,6 +97,22 @@ def test_another_label_txt_is_not_read(tmp_path: Path) -> None:
         (tmp_path / "label.txt").write_bytes(content)
         (sequence,) = find_sequences([tmp_path / "run"])
         assert (sequence.name, sequence.frames[0].place) == ("run", "")
+
+
+@given(st.lists(st.text(alphabet="0123456789-/ \tend", max_size=12), max_size=8).map("\n".join))
+def test_any_text_is_read_or_refused_by_file_and_line(text: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "label.txt")
+        path.write_text(f"1/\n{text}", encoding="utf-8")
+        images = [f"{number:08d}.jpg" for number in range(1, 30)]
+        found: set[str] = set()
+        said = f"{path}:1: "
+        try:
+            found = set(read_places(path, "1", images).places)
+        except SourceError as error:
+            said = str(error)
+        assert re.match(rf"{re.escape(str(path))}:\d+: [^\n]*$", said)
+        assert found <= set(images)
 
 
 def test_real_labels(shared: Path, tmp_path: Path) -> None:
