@@ -55,13 +55,13 @@ class Described:
 
 
 def find_images(globs: Sequence[str], folder: Path) -> list[FrameSequence]:
-    """The sequences in the folders that `globs` name, relative to `folder`; ExperimentError for a glob of none."""
+    """The sequences in what `globs` name (folders, videos, bags), relative to `folder`; ExperimentError for none."""
     found: dict[str, None] = {}
     for pattern in globs:
         paths = sorted(glob.glob(str(folder / pattern)), key=natural_key)
         usable = [path for path in paths if Path(path).is_dir() or is_recording(Path(path))]
         if not usable:
-            raise ExperimentError(f"[data] sequences: {folder / pattern} is no folder; name folders of images")
+            raise ExperimentError(f"[data] sequences: {folder / pattern} is no folder; name folders of images, videos or bags")
         found |= dict.fromkeys(usable)
     return find_sequences(found)
 
