@@ -61,7 +61,8 @@ def find_images(globs: Sequence[str], folder: Path) -> list[FrameSequence]:
         paths = sorted(glob.glob(str(folder / pattern)), key=natural_key)
         usable = [path for path in paths if Path(path).is_dir() or is_recording(Path(path))]
         if not usable:
-            raise ExperimentError(f"[data] sequences: {folder / pattern} is no folder; name folders of images, videos or bags")
+            remedy = "name folders of images, videos or bags"
+            raise ExperimentError(f"[data] sequences: {folder / pattern} is no folder; {remedy}")
         found |= dict.fromkeys(usable)
     return find_sequences(found)
 
