@@ -127,7 +127,8 @@ def answers(
         blank = answer.kept[answer.blank].tolist()
         if blank and not tally.constant:
             frame = batch.frames[blank[0]]
-            log.warning("%s: of one grey level throughout; its descriptor is zero", frame.path)
+            where = frame.path if frame.path.name == frame.name else f"{frame.path}: frame {frame.name}"
+            log.warning("%s: of one grey level throughout; its descriptor is zero", where)
         tally.frames += len(batch.frames)
         tally.skipped += len(answer.reasons)
         tally.constant += len(blank)
