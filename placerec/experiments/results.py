@@ -79,14 +79,10 @@ def way_of(row: Row) -> Way:
 
 @dataclass(frozen=True)
 class FoldData:
-    """What the recordings of a fold hold: labelled images per place, and the mean run of equal words by (size, seed).
-
-    Runs are those of the training sequences (readings A30).
-    """
+    """What the recordings of a fold hold: labelled images per place."""
 
     train: Mapping[str, int]
     test: Mapping[str, int]
-    same_word_run: Mapping[tuple[int, int], float]
 
 
 @dataclass(frozen=True)
