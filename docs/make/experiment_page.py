@@ -13,6 +13,7 @@ import logging
 import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ KEPT = ("results.csv", "sequences.csv", "figure.png", "figure-learned.png")
 SYNTHETIC = "synthetic"
 SHARES = ("accuracy", "balanced_accuracy", "majority_accuracy", "same_word_run", "log_loss", "ece")
 TRANSITIONS = ("fixed", "learned")
+SELECTIONS = ("none", "subsample:3", "subsample:5", "compress:3", "unique")
 SLOT = re.compile(r"(<!-- table: (.+?) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)
 
 
@@ -154,24 +156,26 @@ def baselines_table(rows: Sequence[Row]) -> Table:
 
 
 def selection_table(rows: Sequence[Row]) -> Table:
-    """For every selection the frames right and the latency, mean over all cells."""
+    """For every smoothing and selection the frames right, the latency and the log loss, mean over sizes and orders."""
     lines = []
-    for select in ("none", "subsample:3", "subsample:5", "compress:3", "unique"):
-        line = [select]
+    for smoothing, select in product(("witten-bell", "lidstone-backoff"), SELECTIONS):
+        line = [smoothing, select]
         for transition in TRANSITIONS:
-            own = _of(rows, select=select, transition=transition)
+            own = _of(rows, smoothing=smoothing, select=select, transition=transition)
             late = [row.change_latency_frames for row in own if row.change_latency_frames is not None]
-            line += [_text(_percent(own)), f"{np.mean(late):.1f}"]
+            loss = [row.log_loss for row in own]
+            line += [_text(_percent(own)), f"{np.mean(late):.1f}", f"{np.mean(loss):.2f}"]
         lines.append(line)
-    return ("selection", *(f"{of}: {what}" for of in TRANSITIONS for what in ("frames right, %", "latency"))), lines
+    measured = ("frames right", "latency", "log loss")
+    return ("smoothing", "selection", *(f"{of}: {what}" for of in TRANSITIONS for what in measured)), lines
 
 
 def order_table(rows: Sequence[Row]) -> Table:
-    """For every order and smoothing the frames right without selection, mean over sizes."""
+    """For every order the frames right without selection, mean over sizes."""
     orders = sorted({row.order for row in rows})
     lines = []
     for transition in TRANSITIONS:
-        for smoothing in sorted({row.smoothing for row in rows}, reverse=True):
+        for smoothing in ("witten-bell", "lidstone-backoff"):
             own = _of(rows, transition=transition, smoothing=smoothing, select="none")
             lines.append((transition, smoothing, *(f"{_percent(_of(own, order=n)).mean():.1f}" for n in orders)))
     return ("transitions", "smoothing", *(f"n = {n}" for n in orders)), lines
