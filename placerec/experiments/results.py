@@ -18,18 +18,22 @@ COLUMNS = (
     "same_word_run,frame_wise_accuracy,change_latency_frames,log_loss,ece"
 )
 SEQUENCE_COLUMNS = (
-    "size,seed,fold,smoothing,select,order,transition,sequence,frames,right,frame_wise_right,majority_right"
+    "size,seed,fold,smoothing,select,order,transition,sequence,frames,right,frame_wise_right,majority_right,late"
 )
 
 
 @dataclass(frozen=True)
 class SequenceCount:
-    """Labelled frames of a test sequence, and how many of them are right: by the cell, frame-wise, and by majority."""
+    """Labelled frames of a test sequence, and how many of them are right: by the cell, frame-wise, and by majority.
+
+    `late` frames are wrong ones between a change of place and the first right frame, the sum of the latencies.
+    """
 
     frames: int
     right: int
     frame_wise: int
     majority: int
+    late: int
 
 
 @dataclass(frozen=True)

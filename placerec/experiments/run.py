@@ -91,8 +91,8 @@ def _row(unit: Unit, cell: Cell, results: Mapping[str, Any]) -> Row:
         select=unit.job.select,
         same_word_run=data["same_word_run"],
         sequences={
-            name: SequenceCount(frames, right, frame_wise[name], labels[name])
-            for name, (frames, right) in found["sequences"].items()
+            name: SequenceCount(frames, right, frame_wise[name], labels[name], late)
+            for name, (frames, right, late) in found["sequences"].items()
         },
         **cell._asdict(),
         **{name: found[name] for name in _KEPT},

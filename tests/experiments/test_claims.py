@@ -33,7 +33,7 @@ def grid(
                         for s in range(sequences):
                             frames = 1000 * (s + 1)
                             right = round(frames * percent(size, smoothing, select, order, s) / 100) + (2 * seed - 1)
-                            counts[f"run{s}"] = SequenceCount(frames, right, 0, frames // 3)
+                            counts[f"run{s}"] = SequenceCount(frames, right, 0, frames // 3, 0)
                         rows.append(row(size, seed, smoothing, select, order, counts))
     return Results(rows, {})
 
