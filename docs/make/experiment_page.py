@@ -21,7 +21,7 @@ import numpy as np
 
 from placerec.evaluation.bootstrap import LEAST
 from placerec.experiments import Results, Row, experiment
-from placerec.experiments.claims import judge
+from placerec.experiments.claims import Claim, judge
 from placerec.experiments.results import SequenceCount, by_seed
 from placerec.experiments.tables import Table, markdown, numbers_of
 from placerec.files import write_text
@@ -84,7 +84,7 @@ def _row(line: Mapping[str, str], sequences: Mapping[str, SequenceCount]) -> Row
     )
 
 
-def sets() -> dict[str, list[Row]]:
+def read_all() -> dict[str, list[Row]]:
     """The rows of every set whose results are there."""
     return {path.parent.name: read_rows(path.parent) for path in sorted(FOLDER.glob("*/results.csv"))}
 
@@ -92,25 +92,28 @@ def sets() -> dict[str, list[Row]]:
 def tables(found: Mapping[str, Sequence[Row]]) -> dict[str, str]:
     """What belongs between the marks of the page, by name; real and synthetic sets share no table."""
     made = {}
+    claims = {name: [judge(Results(rows, {}), of) for of in TRANSITIONS] for name, rows in found.items()}
     for name, rows in found.items():
         made[f"{name} data"] = data_line(rows)
         made[f"{name} baselines"] = markdown(baselines_table(rows))
         made[f"{name} selection"] = markdown(selection_table(rows))
         made[f"{name} order"] = markdown(order_table(rows))
-        made[f"{name} claims"] = markdown(claims_table(rows))
-    real = {name: rows for name, rows in found.items() if name != SYNTHETIC and _number(rows) >= LEAST}
-    made["real verdicts"] = markdown(verdicts_table(real))
-    made["synthetic verdicts"] = markdown(verdicts_table({SYNTHETIC: found[SYNTHETIC]}))
+        made[f"{name} claims"] = markdown(claims_table(claims[name]))
+    synthetic = {SYNTHETIC: claims.pop(SYNTHETIC)}
+    enough = {name: its for name, its in claims.items() if len(_sequences(found[name])) >= LEAST}
+    made["real verdicts"] = markdown(verdicts_table(enough))
+    made["synthetic verdicts"] = markdown(verdicts_table(synthetic))
     return made
 
 
-def _number(rows: Sequence[Row]) -> int:
-    return len({name for row in rows for name in row.sequences})
+def _sequences(rows: Sequence[Row]) -> dict[str, int]:
+    """The test sequences and their frames."""
+    return {name: one.frames for row in rows for name, one in row.sequences.items()}
 
 
 def data_line(rows: Sequence[Row]) -> str:
     """What was tested, and how much of it was right over all."""
-    frames = {name: one.frames for row in rows for name, one in row.sequences.items()}
+    frames = _sequences(rows)
     folds, seeds = len({row.fold for row in rows}), len({row.seed for row in rows})
     fixed, learned = (_percent(_of(rows, transition=of)).mean() for of in TRANSITIONS)
     return (
@@ -184,9 +187,8 @@ def order_table(rows: Sequence[Row]) -> Table:
     return ("transitions", "smoothing", *(f"n = {n}" for n in orders)), lines
 
 
-def claims_table(rows: Sequence[Row]) -> Table:
+def claims_table(both: Sequence[Sequence[Claim]]) -> Table:
     """A line per statement, with fixed and with learned transitions."""
-    both = [judge(Results(rows, {}), transition) for transition in TRANSITIONS]
     lines = []
     for claims in zip(*both, strict=True):
         for number, same in enumerate(zip(*(claim.statements for claim in claims), strict=True)):
@@ -199,11 +201,11 @@ def claims_table(rows: Sequence[Row]) -> Table:
     return ("claim", "measured", "wanted", *head), lines
 
 
-def verdicts_table(found: Mapping[str, Sequence[Row]]) -> Table:
+def verdicts_table(sets: Mapping[str, Sequence[Sequence[Claim]]]) -> Table:
     """A line per claim: its verdict on every set, with fixed and with learned transitions."""
-    judged = [judge(Results(rows, {}), transition) for rows in found.values() for transition in TRANSITIONS]
+    judged = [claims for both in sets.values() for claims in both]
     lines = [(same[0].name, same[0].text, *(claim.verdict for claim in same)) for same in zip(*judged, strict=True)]
-    return ("claim", "the paper says", *(f"{name}, {of}" for name in found for of in TRANSITIONS)), lines
+    return ("claim", "the paper says", *(f"{name}, {of}" for name in sets for of in TRANSITIONS)), lines
 
 
 def filled(page: str, made: Mapping[str, str]) -> str:
@@ -225,4 +227,4 @@ if __name__ == "__main__":
     for name in (options.set or names) if options.data else ():
         run(name, options.data, options.work, options.jobs)
         sys.stderr.write(f"{name}: done\n")
-    write_text(PAGE, filled(PAGE.read_text(encoding="utf-8"), tables(sets())))
+    write_text(PAGE, filled(PAGE.read_text(encoding="utf-8"), tables(read_all())))
