@@ -79,14 +79,15 @@ def draw(blocks: int, seed: int, draws: int = DRAWS) -> NDArray[np.int64]:
 
 
 def interval(drawn: NDArray[np.int64], value: Floats, frames: NDArray[np.int64]) -> tuple[float, float]:
-    """The percentile interval of sum(value) / sum(frames) over the draws; `value` float64 (U,), `frames` int64 (U,).
-
-    It is widened to hold the quotient over all blocks, should it lie outside.
-    """
+    """The percentile interval of sum(value) / sum(frames) over the draws; `value` float64 (U,), `frames` int64 (U,)."""
     # Not BLAS, whose sums depend on the number of its threads.
     shares = np.einsum("du,u->d", drawn, value) / np.einsum("du,u->d", drawn, frames)
-    low, high = np.quantile(shares, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]).tolist()
-    whole = float(value.sum() / frames.sum())
+    return middle(shares, float(value.sum() / frames.sum()))
+
+
+def middle(drawn: Floats, whole: float) -> tuple[float, float]:
+    """The middle 95 % of what the draws give, float64 (draws,), widened to hold `whole`, that over all blocks."""
+    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]).tolist()
     return min(low, whole), max(high, whole)
 
 

@@ -8,13 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.evaluation.bootstrap import draw
+from placerec.evaluation.bootstrap import DRAWS, Floats, draw
 from placerec.experiments.results import Row
-
-DRAWS = 2000
-Floats = NDArray[np.float64]
 
 
 class MissingCellsError(Exception):
@@ -101,12 +97,6 @@ def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
 def drawn(sequences: int, draws: int) -> Floats:
     """How often each sequence is there, float64 (1 + draws, sequences): once each, then as a fixed seed draws them."""
     return np.concatenate([np.ones((1, sequences)), draw(sequences, 0, draws).astype(np.float64)])
-
-
-def interval(values: Floats) -> tuple[float, float]:
-    """The middle 95 % of the draws in `values` (1 + DRAWS,)."""
-    low, high = np.percentile(values[1:], (2.5, 97.5))
-    return float(low), float(high)
 
 
 def _key(row: Row) -> tuple[int | str, ...]:

@@ -14,7 +14,7 @@ from placerec.errors import ExperimentError, PlacerecError
 from placerec.files import read_text, write_text
 from placerec.version import __version__
 
-FORMAT = "placerec experiment 1"
+FORMAT = "placerec experiment 2"
 
 
 def key_of(*parts: Any) -> str:

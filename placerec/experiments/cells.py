@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.evaluation import evaluate
+from placerec.evaluation.metrics import change_latencies, codes, right_frames
 from placerec.experiments import cache
 from placerec.hohmm import Beliefs, Emissions, Transition, best_places, fixed_transition, learned_transition
 from placerec.hohmm.evidence import evidence_in
@@ -192,16 +193,15 @@ def judged(beliefs: Sequence[Beliefs]) -> dict[str, Any]:
         "change_latency_frames": found.change_latency_frames,
         "log_loss": found.log_loss,
         "ece": found.ece,
-        "sequences": dict(_right(beliefs)),
+        "sequences": {one.name: _counts_of(one) for one in beliefs},
         "majority": {one.name: one.truth.count(found.majority_place) for one in beliefs},
     }
 
 
-def _right(beliefs: Sequence[Beliefs]) -> Iterator[tuple[str, list[int]]]:
-    """Per sequence, its labelled frames and how many of them were decided rightly."""
-    for one in beliefs:
-        pairs = [(truth, best) for truth, best in zip(one.truth, one.best, strict=True) if truth]
-        yield one.name, [len(pairs), sum(truth == best for truth, best in pairs)]
+def _counts_of(one: Beliefs) -> list[int]:
+    """The labelled frames of a sequence, how many of them were decided rightly, and how many late."""
+    truth, right = codes(one.truth, sorted({*one.truth} - {""})), right_frames(one)
+    return [int((truth >= 0).sum()), int(right.sum()), int(change_latencies(truth, right).sum())]
 
 
 def describe_data(training: Sequence[WordStream], tests: Sequence[WordStream]) -> dict[str, Any]:

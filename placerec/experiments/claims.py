@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placerec.experiments.bootstrap import Floats, MissingCellsError, Scores, interval, mean, scores
+from placerec.evaluation.bootstrap import LEAST, Floats, middle
+from placerec.experiments.bootstrap import MissingCellsError, Scores, mean, scores
 from placerec.experiments.results import Results
 
 HOLDS, FAILS, UNKNOWN = "holds", "does not hold", "cannot tell"
 # Points: what counts as several percent, as no more than a little, and as among the best.
 SEVERAL, LITTLE, AMONG = 2.0, 2.0, 1.0
 HIGH = 80.0
-LEAST_SEQUENCES = 3
 NONE, THREE, FIVE, COMPRESS, UNIQUE = "none", "subsample:3", "subsample:5", "compress:3", "unique"
 # Of the smoothings in a grid, the first of these stands for the paper's (readings A11, A12).
 WITTEN_BELL = ("witten-bell", "witten-bell-backoff")
@@ -27,7 +27,8 @@ LIDSTONE = ("lidstone-backoff", "lidstone")
 class Statement:
     """`text` says what `values` (1 + DRAWS,) are, in points; they should be `above` the threshold, `below` or `within`.
 
-    `values` is None where the grid cannot tell, for the `reason`.
+    `values` is None where the grid lacks cells, and holds the number alone where there is nothing to draw. A `reason`
+    says why there is no verdict.
     """
 
     text: str
@@ -39,14 +40,16 @@ class Statement:
     @property
     def interval(self) -> tuple[float, float] | None:
         """The 95 % interval."""
-        return None if self.values is None else interval(self.values)
+        if self.values is None or len(self.values) == 1:
+            return None
+        return middle(self.values[1:], float(self.values[0]))
 
     @property
     def verdict(self) -> str:
         """HOLDS, FAILS or UNKNOWN."""
-        if self.values is None:
+        if self.reason or self.interval is None:
             return UNKNOWN
-        (low, high), t = interval(self.values), self.threshold
+        (low, high), t = self.interval, self.threshold
         if self.side == "within":
             return HOLDS if -t < low and high < t else FAILS if low >= t or high <= -t else UNKNOWN
         if self.side == "below":
@@ -80,8 +83,9 @@ def judge(results: Results, transition: str) -> list[Claim]:
     paper = {name for family in (WITTEN_BELL, LIDSTONE) for name in family[:1] if name in {r.smoothing for r in rows}}
     found = scores([row for row in rows if row.smoothing in paper or not paper])
     reason = ""
-    if len(found.sequences) < LEAST_SEQUENCES:
-        reason = f"{len(found.sequences)} test sequences; an interval needs {LEAST_SEQUENCES} or more"
+    if len(found.sequences) < LEAST:
+        number = len(found.sequences)
+        reason = f"{number} test sequence{'s' * (number != 1)}; a verdict needs {LEAST} or more"
     return [Claim(name, text, _stated(statements, found, reason)) for name, text, statements in CLAIMS]
 
 
@@ -89,9 +93,8 @@ def _stated(statements: Callable[[Scores], list["Lazy"]], found: Scores, reason:
     stated = []
     for lazy in statements(found):
         try:
-            if reason:
-                raise MissingCellsError(reason)
-            stated.append(Statement(lazy.text, lazy.values(), lazy.side, lazy.threshold))
+            values = lazy.values() if len(found.sequences) > 1 else lazy.values()[:1]
+            stated.append(Statement(lazy.text, values, lazy.side, lazy.threshold, reason))
         except MissingCellsError as error:
             stated.append(Statement(lazy.text, None, lazy.side, lazy.threshold, str(error)))
     return stated

@@ -95,7 +95,7 @@ def _write(results: Results, plan: Config, config: Path, units: Sequence[Unit], 
     body += [
         heading("The data"),
         _table(images_table(results.folds), "Labelled images per place and split."),
-        _table(runs_table(results.folds), "Frames in a row with the same word, in training."),
+        _table(runs_table(results.rows), "Frames in a row with the same word, in training."),
         *_closer_look(results, units),
         heading("Do it again"),
         preformatted(f"placerec experiment {shlex.quote(config.name)} -o {shlex.quote(out.resolve().name)}/"),

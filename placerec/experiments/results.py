@@ -18,18 +18,22 @@ COLUMNS = (
     "same_word_run,frame_wise_accuracy,change_latency_frames,log_loss,ece"
 )
 SEQUENCE_COLUMNS = (
-    "size,seed,fold,smoothing,select,order,transition,sequence,frames,right,frame_wise_right,majority_right"
+    "size,seed,fold,smoothing,select,order,transition,sequence,frames,right,frame_wise_right,majority_right,late"
 )
 
 
 @dataclass(frozen=True)
 class SequenceCount:
-    """Labelled frames of a test sequence, and how many of them are right: by the cell, frame-wise, and by majority."""
+    """Labelled frames of a test sequence, and how many of them are right: by the cell, frame-wise, and by majority.
+
+    `late` frames are wrong ones between a change of place and the first right frame, the sum of the latencies.
+    """
 
     frames: int
     right: int
     frame_wise: int
     majority: int
+    late: int
 
 
 @dataclass(frozen=True)
@@ -79,14 +83,10 @@ def way_of(row: Row) -> Way:
 
 @dataclass(frozen=True)
 class FoldData:
-    """What the recordings of a fold hold: labelled images per place, and the mean run of equal words by (size, seed).
-
-    Runs are those of the training sequences (readings A30).
-    """
+    """What the recordings of a fold hold: labelled images per place."""
 
     train: Mapping[str, int]
     test: Mapping[str, int]
-    same_word_run: Mapping[tuple[int, int], float]
 
 
 @dataclass(frozen=True)

@@ -71,11 +71,7 @@ def collect(units: Sequence[Unit], found: Sequence[Mapping[str, Any]]) -> Result
     rows: list[Row] = []
     folds: dict[str, FoldData] = {}
     for unit, results in zip(units, found, strict=True):
-        data = results["data"]
-        fold = folds.setdefault(unit.fold.name, FoldData(data["train"], data["test"], {}))
-        folds[unit.fold.name] = FoldData(
-            fold.train, fold.test, {**fold.same_word_run, (unit.size, unit.seed): data["same_word_run"]}
-        )
+        folds[unit.fold.name] = FoldData(results["data"]["train"], results["data"]["test"])
         rows += [_row(unit, cell, results) for cell in unit.job.cells]
     return Results(sorted(rows, key=_place_in_file), folds)
 
@@ -95,8 +91,8 @@ def _row(unit: Unit, cell: Cell, results: Mapping[str, Any]) -> Row:
         select=unit.job.select,
         same_word_run=data["same_word_run"],
         sequences={
-            name: SequenceCount(frames, right, frame_wise[name], labels[name])
-            for name, (frames, right) in found["sequences"].items()
+            name: SequenceCount(frames, right, frame_wise[name], labels[name], late)
+            for name, (frames, right, late) in found["sequences"].items()
         },
         **cell._asdict(),
         **{name: found[name] for name in _KEPT},

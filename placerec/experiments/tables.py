@@ -1,12 +1,12 @@
 """The experiment in words: the paper's tables and its claims, as Markdown."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from placerec.experiments.bootstrap import DRAWS
-from placerec.experiments.claims import HIGH, LEAST_SEQUENCES, Claim, Statement
-from placerec.experiments.results import FoldData, Results, Way, by_seed
+from placerec.evaluation.bootstrap import DRAWS, LEAST
+from placerec.experiments.claims import HIGH, Claim, Statement
+from placerec.experiments.results import FoldData, Results, Row, Way, by_seed
 
 PAPER_RUNS = {10: 3.15, 20: 2.67}
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
@@ -23,14 +23,13 @@ def images_table(folds: Mapping[str, FoldData]) -> Table:
     return ("fold", "split", *places, "all"), lines
 
 
-def runs_table(folds: Mapping[str, FoldData]) -> Table:
+def runs_table(rows: Iterable[Row]) -> Table:
     """Frames in a row with the same word in training, mean over seeds and folds (the paper's Table 1)."""
-    runs: dict[int, list[float]] = {}
-    for fold in folds.values():
-        for (size, _), run in fold.same_word_run.items():
-            runs.setdefault(size, []).append(run)
+    runs: dict[int, dict[tuple[int, str], float]] = {}
+    for row in rows:
+        runs.setdefault(row.size, {})[row.seed, row.fold] = row.same_word_run
     paper = {size: f"{run:g}" for size, run in PAPER_RUNS.items()}
-    lines = [(str(size), f"{np.mean(its):.2f}", paper.get(size, "")) for size, its in sorted(runs.items())]
+    lines = [(str(size), f"{np.mean([*its.values()]):.2f}", paper.get(size, "")) for size, its in sorted(runs.items())]
     return ("S", "same-word run", "in the paper, on COLD"), lines
 
 
@@ -75,9 +74,8 @@ def claims_table(claims: Sequence[Claim]) -> Table:
 def numbers_of(statement: Statement) -> tuple[str, str, str]:
     """The number, its interval or why there is none, and what was wanted."""
     found = statement.interval
-    if statement.values is None or found is None:
-        return "", statement.reason, statement.wanted
-    return f"{statement.values[0]:+.1f}", f"{found[0]:+.1f} to {found[1]:+.1f}", statement.wanted
+    number = "" if statement.values is None else f"{statement.values[0]:+.1f}"
+    return number, f"{found[0]:+.1f} to {found[1]:+.1f}" if found else statement.reason, statement.wanted
 
 
 def reading(sequences: int, seeds: int) -> str:
@@ -87,9 +85,9 @@ def reading(sequences: int, seeds: int) -> str:
         f"draws of the {sequences} test sequences with replacement, the same draws on both sides of a difference; it "
         "does not cover what other training sequences would change. A number holds if its whole interval is where it "
         "is wanted, does not hold if the whole interval is elsewhere, and otherwise cannot be told. A claim holds if "
-        f"all its numbers hold. Fewer than {LEAST_SEQUENCES} test sequences tell nothing. A best or worst cell is "
-        "chosen on all sequences, so its number flatters. What several percent (2), little (2), among the best (1) "
-        f"and high ({HIGH:g} %) mean was set by placerec, not by the paper."
+        f"all its numbers hold. Fewer than {LEAST} test sequences tell nothing: by chance all may be on one side. A "
+        "best or worst cell is chosen on all sequences, so its number flatters. What several percent (2), little (2), "
+        f"among the best (1) and high ({HIGH:g} %) mean was set by placerec, not by the paper."
     )
 
 
@@ -108,7 +106,7 @@ def format_tables(results: Results) -> str:
         markdown(images_table(results.folds)),
         "## Frames in a row with the same word\n",
         "Training sequences, mean over seeds and folds, cut at the ends of sequences.\n",
-        markdown(runs_table(results.folds)),
+        markdown(runs_table(results.rows)),
         "## The best of the grid\n",
         markdown(best_table(results)),
     ]

@@ -13,10 +13,21 @@ from placerec.evaluation import evaluate_files
 from placerec.experiments import read_config
 from placerec.experiments.cells import Cell, CellJob, believe_cell, describe_data, seven_digits
 from placerec.experiments.run import run_grid
+from placerec.hohmm import Beliefs, read_beliefs
 from placerec.model import Decoding, Options, decode, train_lm
 from placerec.words import WordStream, parse_selection
 
 TRANSITIONS = {"fixed": Decoding(stay=0.9, per="frame"), "learned": Decoding(transition="learned")}
+
+
+def late_frames(beliefs: Beliefs) -> int:
+    """Wrong frames since the last change of place, until one is right, one frame at a time."""
+    late, before, waiting = 0, "", False
+    for truth, best in zip(beliefs.truth, beliefs.best, strict=True):
+        waiting = truth != best and (waiting or before not in ("", truth))
+        late += waiting
+        before = truth
+    return late
 
 
 def test_rows_are_those_of_the_commands(tmp_path: Path) -> None:
@@ -36,6 +47,7 @@ def test_rows_are_those_of_the_commands(tmp_path: Path) -> None:
         assert row.change_latency_frames == found.change_latency_frames
         assert row.log_loss == pytest.approx(found.log_loss, rel=1e-6)
         assert row.sequences["run3"].right == round(found.accuracy * found.frames)
+        assert row.sequences["run3"].late == late_frames(read_beliefs(tmp_path / "beliefs" / "run3.tsv"))
     with (tmp_path / "out" / "results.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["accuracy"] for row in rows] == [f"{row.accuracy:.6f}" for row in results.rows]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from placerec.experiments.bootstrap import MissingCellsError, drawn, interval, scores
+from placerec.experiments.bootstrap import MissingCellsError, drawn, scores
 from placerec.experiments.claims import FAILS, HOLDS, UNKNOWN, judge
 from placerec.experiments.results import Results, Row, SequenceCount
 
@@ -33,7 +33,7 @@ def grid(
                         for s in range(sequences):
                             frames = 1000 * (s + 1)
                             right = round(frames * percent(size, smoothing, select, order, s) / 100) + (2 * seed - 1)
-                            counts[f"run{s}"] = SequenceCount(frames, right, 0, frames // 3)
+                            counts[f"run{s}"] = SequenceCount(frames, right, 0, frames // 3, 0)
                         rows.append(row(size, seed, smoothing, select, order, counts))
     return Results(rows, {})
 
@@ -109,7 +109,7 @@ def test_sequences_that_disagree_cannot_tell() -> None:
         ({"smoothings": ["witten-bell"]}, "O8", "the grid has no smoothing lidstone-backoff or lidstone"),
         ({"orders": [2, 3]}, "O9", "the grid has no order 1"),
         ({"orders": [1, 2]}, "O10", "the grid has no order for it"),
-        ({"sequences": 2}, "O11", "2 test sequences; an interval needs 3 or more"),
+        ({"sequences": 5}, "O11", "5 test sequences; a verdict needs 6 or more"),
     ],
 )
 def test_what_the_grid_lacks_is_told(lacking: dict[str, Sequence[int]], name: str, reason: str) -> None:
@@ -144,7 +144,15 @@ def test_the_bootstrap_is_that_of_a_slow_version() -> None:
     assert found.majority == pytest.approx(33.3, abs=0.1)
 
 
-def test_the_interval_covers_the_middle_of_the_draws() -> None:
-    assert interval(np.concatenate([[np.nan], np.arange(1001.0)])) == pytest.approx((25, 975))
+def test_an_interval_needs_two_sequences() -> None:
+    for sequences, there in ((1, False), (2, True)):
+        for claim in judge(grid(as_the_paper_says, sequences=sequences), "fixed"):
+            assert claim.verdict == UNKNOWN
+            for one in claim.statements:
+                assert one.values is not None
+                assert (one.interval is not None) == there
+
+
+def test_a_cell_that_is_not_there_is_told() -> None:
     with pytest.raises(MissingCellsError, match="no order 7"):
         scores(grid(either, orders=(1,)).rows).take(order=[7])

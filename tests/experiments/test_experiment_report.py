@@ -65,7 +65,7 @@ def test_every_claim_is_judged_for_every_kind_of_transitions(world: Path) -> Non
     for name, _, _ in CLAIMS:
         # The verdicts, and twice the numbers.
         assert len(re.findall(rf"^\| {name} \|", text, re.MULTILINE)) == 3
-    assert "1 test sequences; an interval needs 3 or more" in text
+    assert "1 test sequence; a verdict needs 6 or more" in text
 
 
 def test_tables_count_images_and_runs(world: Path) -> None:

@@ -11,7 +11,7 @@ from placerec.experiments.results import Row, SequenceCount, Way, by_seed
 
 
 def row(seed: int, fold: str, right: int, order: int = 1) -> Row:
-    counts = {f"run-{fold}": SequenceCount(100, right, 50, 30)}
+    counts = {f"run-{fold}": SequenceCount(100, right, 50, 30, 0)}
     return Row(4, seed, fold, "witten-bell", "none", order, "fixed", 100, 0, 0, 0, 0, None, 0, 0, counts)
 
 
