@@ -97,7 +97,7 @@ def decode(
         check_method(method, options, scorer=scorer)
     if live:
         if words is None or len(tokens) > 1 or Path("-") in tokens:
-            raise click.UsageError("--live follows one camera or video, and sees it through -w")
+            raise click.UsageError("--live takes one camera or video, and needs -w to see it")
         _check_answering("--live", out, options)
         make = partial(make_decoder, method)
         answers = decode_live(

@@ -40,6 +40,7 @@ def tokenize(
     SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
     folder of images (any, or laid out as in COLD, KTH-IDOL2 or VPC), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
     folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
+    A camera (camera:0, camera:rtsp://...) is recorded until Ctrl-C.
     """
     from placerec.words.tokenize import tokenize as run
 

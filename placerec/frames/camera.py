@@ -13,16 +13,16 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from placerec.errors import SourceError
 from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt
-from placerec.frames.image import MIN_SIDE, quiet
+from placerec.frames.image import quiet
+from placerec.frames.reading import Reading
 from placerec.frames.sequence import Frame, Gray, Sequence
+from placerec.frames.video import grabbed_gray
 
 if TYPE_CHECKING:
     import cv2
@@ -38,9 +38,10 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera as a recording without an end; `source` is what the user named it by, without `camera:`."""
+    """Every `every`-th image of a camera, without an end; `source`: what the user named it by, without `camera:`."""
 
     source: str
+    every: int = 1
 
     @property
     def endless(self) -> bool:
@@ -57,16 +58,16 @@ class Camera:
         if self.source.isdecimal():
             return f"camera{int(self.source)}"
         if "://" not in self.source:
-            return Path(self.source).stem
+            return Path(self.source).name
         address = re.sub(r"^\w+://([^/@]*@)?|[?#].*", "", self.source)
         return re.sub(r"[^\w.-]+", "-", address).strip("-.") or "camera"
 
     def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
-        """Every frame from now on, numbered from `first`, until the camera gives no more or Ctrl-C is pressed.
+        """The frames from now on, until the camera gives no more or Ctrl-C is pressed; `first` must be 0.
 
         Raises SourceError if the camera cannot be opened, or never gives an image.
         """
-        feed = Feed(lambda stopped: self.arrivals(stopped, first), room=HELD)
+        feed = Feed(self.arrivals, room=HELD)
         told = False
         with closing(feed), ended_by_interrupt(feed):
             log.info("%s: recording until Ctrl-C", self)
@@ -81,27 +82,25 @@ class Camera:
         """None: nothing of a camera is there twice."""
         return []
 
-    def arrivals(self, stopped: Stopped, first: int = 0) -> Iterator[Arrival]:
+    def arrivals(self, stopped: Stopped) -> Iterator[Arrival]:
         """Frames as they come, on the thread that asks for them; raises as `shots` does."""
-        with quiet(), _opened(self) as camera:
-            number, began = first, None
-            for failed in _grabbed(camera, stopped):
+        positions, began = count(), None
+        with quiet(), _opened(self) as capture:
+            for damaged in _grabbed(capture, stopped):
                 came = time.monotonic()
                 began = time.time() - came if began is None else began
-                for _ in range(failed):
-                    yield self._arrival(number, began + came, "cannot be decoded", came)
-                    number += 1
-                yield self._arrival(number, began + came, _gray(*camera.retrieve()), came)
-                number += 1
+                for good in (*[False] * damaged, True):
+                    position = next(positions)
+                    if position % self.every:
+                        continue
+                    frame = Frame(f"{position:06d}", began + came, "", self.path)
+                    name = f"{self}: frame {frame.name}"
+                    image = grabbed_gray(capture, name) if good else f"{name} cannot be decoded"
+                    yield Arrival(position // self.every, frame, image, came)
         if began is None and not stopped():
             raise SourceError(f"{self}: gives no image; look whether another program uses it, and whether it is on")
         if not stopped():
             log.warning("%s: gives no more images", self)
-
-    def _arrival(self, number: int, seconds: float, image: Gray | str, came: float) -> Arrival:
-        if isinstance(image, str):
-            image = f"{self}: image {number} {image}"
-        return Arrival(number, Frame(str(number), seconds, "", self.path), image, came)
 
     def __str__(self) -> str:
         return PREFIX + re.sub(r"//[^/@]*@", "//", self.source)
@@ -112,7 +111,7 @@ def is_camera(source: Path | str) -> bool:
     return str(source).startswith(PREFIX)
 
 
-def find_camera(sources: Iterable[Path | str], endless: bool) -> Sequence | None:
+def find_camera(sources: Iterable[Path | str], reading: Reading, endless: bool) -> Sequence | None:
     """The camera that is the only one of `sources`, None if there is no camera among them.
 
     Raises SourceError for a camera beside other sources, one that is named in no way that can be understood, and any
@@ -122,7 +121,7 @@ def find_camera(sources: Iterable[Path | str], endless: bool) -> Sequence | None
     cameras = [str(source) for source in sources if is_camera(source)]
     if not cameras:
         return None
-    camera = Camera(cameras[0].removeprefix(PREFIX))
+    camera = Camera(cameras[0].removeprefix(PREFIX), reading.every)
     if not endless:
         raise SourceError(f"{camera}: a camera is for tokenize and decode alone; make a video with it, and name that")
     if len(sources) > 1:
@@ -130,6 +129,8 @@ def find_camera(sources: Iterable[Path | str], endless: bool) -> Sequence | None
     if not (camera.source.isdecimal() or camera.source.startswith("/") or re.match(r"\w+://.", camera.source)):
         slash = "; give an address as text, not as a path" if re.match(r"\w+:/", camera.source) else ""
         raise SourceError(f"{camera}: is no camera; name camera:0, camera:/dev/video0 or camera:rtsp://...{slash}")
+    if reading.labels or reading.topic:
+        raise SourceError(f"{camera}: is a camera, which has neither labels nor topics; leave them out")
     return Sequence(camera.name, [], camera.path, camera)
 
 
@@ -182,15 +183,3 @@ def _check_device(camera: Camera) -> None:
         raise SourceError(f"{camera}: is no device; for a file or a folder leave {PREFIX} out")
     if not os.access(path, os.R_OK | os.W_OK):
         raise SourceError(f"{camera}: {path} may not be opened; ask for the permission (on most systems: group video)")
-
-
-def _gray(got: bool, pixels: NDArray[Any] | None) -> Gray | str:
-    import cv2
-
-    if not got or pixels is None:
-        return "cannot be decoded"
-    if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or min(pixels.shape[:2]) < MIN_SIDE:
-        return f"is {pixels.dtype} {pixels.shape}, and bytes of at least {MIN_SIDE} x {MIN_SIDE} pixels are needed"
-    if pixels.ndim == 3 and pixels.shape[2] == 3:
-        pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY)
-    return cast(Gray, pixels if pixels.ndim == 2 else pixels[..., 0])

@@ -54,7 +54,7 @@ def find_sequences(
     bag without rosbags.
     """
     sources = [sources] if isinstance(sources, str | Path) else list(sources)
-    if camera := find_camera(sources, endless):
+    if camera := find_camera(sources, reading, endless):
         return [camera]
     paths = [Path(source) for source in sources]
     found = [item for path in paths for item in _in_source(path, reading.format)]

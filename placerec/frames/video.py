@@ -52,7 +52,7 @@ class Video:
                 if between or index < first:
                     continue
                 name = f"{self.path}: frame {self.frames[index].name}"
-                yield self.frames[index], _gray(capture, name) if decoded else f"{name} cannot be decoded"
+                yield self.frames[index], grabbed_gray(capture, name) if decoded else f"{name} cannot be decoded"
                 if index == len(self.frames) - 1:
                     return
 
@@ -146,7 +146,8 @@ def _decoded(capture: Any, times: "array[float]", *, late: bool) -> Iterator[tup
     yield from ((missing, False) for missing in range(done, len(times)))
 
 
-def _gray(capture: Any, name: str) -> Gray | str:
+def grabbed_gray(capture: Any, name: str) -> Gray | str:
+    """The grey levels of the frame that was grabbed last, or the reason why it has none, which begins with `name`."""
     import cv2
 
     with quiet():

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from placerec.errors import ModelError, SourceError, StreamError, VisionError
-from placerec.frames import Frame, Reading, Sequence, find_sequences, read_gray
+from placerec.errors import ModelError, StreamError, VisionError
+from placerec.frames import Frame, Reading, Sequence, find_sequences
 from placerec.frames.camera import Camera
 from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt, paced
-from placerec.frames.sequence import Gray
+from placerec.frames.images import all_images
 from placerec.hohmm import Belief, format_header
 from placerec.model.corpus import STREAM_SUFFIXES
 from placerec.model.decode import format_line
@@ -93,12 +93,13 @@ def decode_live(
     if len(sequences) > 1:
         raise StreamError(f"{source}: holds {len(sequences)} sequences; name one of them to be played live")
     header = None if as_json else format_header(decoder.places, unknown=decoder.unknown is not None)
-    for frame, belief in follow_live(sequences[0], dictionary, decoder):
-        if header is not None:
-            yield header
-            header = None
-        row = belief.word, belief.selected, belief.best, belief.probability.tolist(), belief.unknown
-        yield format_line(decoder.places, frame.name, frame.time, frame.place, *row, as_json=as_json)
+    with closing(follow_live(sequences[0], dictionary, decoder)) as answers:
+        for frame, belief in answers:
+            if header is not None:
+                yield header
+                header = None
+            row = belief.word, belief.selected, belief.best, belief.probability.tolist(), belief.unknown
+            yield format_line(decoder.places, frame.name, frame.time, frame.place, *row, as_json=as_json)
 
 
 def follow_live(
@@ -140,18 +141,7 @@ def follow_live(
 def _arrivals(sequence: Sequence, stopped: Stopped) -> Iterator[Arrival]:
     if isinstance(sequence.recording, Camera):
         return sequence.recording.arrivals(stopped)
-    return paced(_shots(sequence), stopped)
-
-
-def _shots(sequence: Sequence) -> Iterator[tuple[Frame, Gray | str]]:
-    if sequence.recording is not None:
-        yield from sequence.recording.shots()
-        return
-    for frame in sequence.frames:
-        try:
-            yield frame, read_gray(frame.path)
-        except SourceError as error:
-            yield frame, str(error)
+    return paced(all_images(sequence), stopped)
 
 
 def _believed(arrival: Arrival, dictionary: "Dictionary", decoder: Decoder, tally: "_Tally") -> Belief | None:

@@ -7,9 +7,12 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from itertools import chain, islice, repeat
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from network_camera import jpegs, network_camera
 from typed import done, fails, make_words, misused
@@ -119,7 +122,7 @@ def test_behind_a_reader_that_stands_still_the_newest_waits(world: Path, picture
     assert answered == len(answers)
     assert answered + dropped == seen == 300
     assert dropped > 100
-    assert answers[-1]["frame"] == "299"
+    assert answers[-1]["frame"] == "000299"
     assert "frames dropped so far: they come faster than they are worked on" in stderr
 
 
@@ -145,12 +148,46 @@ def test_what_a_camera_saw_until_the_interrupt_is_written_whole(
     assert came > 0
 
 
+def write_video(path: Path, pictures: list[bytes], rate: float) -> Path:
+    decoded = [cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR) for picture in pictures]
+    images = [image for image in decoded if image is not None]
+    height, width = images[0].shape[:2]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), rate, (width, height))
+    for image in images:
+        writer.write(image)
+    writer.release()
+    return path
+
+
+def test_a_video_is_played_at_its_own_pace(world: Path, pictures: list[bytes], tmp_path: Path) -> None:
+    run = "-w", world / "words.npz", "-m", world / "seen-model"
+    slow, fast = (
+        write_video(tmp_path / "slow.mp4", pictures, 6),
+        write_video(tmp_path / "fast.mp4", 25 * pictures, 2000),
+    )
+    begin = time.monotonic()
+    live = done("decode", slow, "--live", *run)
+    assert time.monotonic() - begin > 11 / 6
+    files = done("decode", slow, *run).stdout.splitlines()
+    seen, answered, dropped = counts(live.stderr)
+    assert (seen, answered + dropped) == (12, 12)
+    # On a machine that stands still for a sixth of a second a frame is dropped.
+    if not dropped:
+        assert live.stdout.splitlines() == files
+    seen, answered, dropped = counts(done("decode", fast, "--live", *run).stderr)
+    assert seen == answered + dropped == 300
+    assert dropped > 0
+    every = done("decode", fast, "--live", "--every", 100, "--json", *run)
+    assert counts(every.stderr)[0] == 3
+    assert {json.loads(line)["frame"] for line in every.stdout.splitlines()} <= {"000000", "000100", "000200"}
+
+
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        ((), "--live follows one camera or video, and sees it through -w"),
-        (("camera:1", "-w", "w.npz"), "--live follows one camera or video, and sees it through -w"),
-        (("-", "-w", "w.npz"), "--live follows one camera or video, and sees it through -w"),
+        ((), "--live takes one camera or video, and needs -w to see it"),
+        (("camera:1", "-w", "w.npz"), "--live takes one camera or video, and needs -w to see it"),
+        (("-", "-w", "w.npz"), "--live takes one camera or video, and needs -w to see it"),
         (("-w", "w.npz", "-o", "b"), "--live answers on stdout and writes no files: it takes neither -o nor --explain"),
         (
             ("-w", "w.npz", "--explain"),

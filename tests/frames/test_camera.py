@@ -14,7 +14,7 @@ from network_camera import jpegs, network_camera
 from small import write_images
 
 from placerec.errors import SourceError
-from placerec.frames import find_sequences
+from placerec.frames import Reading, find_sequences
 from placerec.frames.camera import Camera, is_camera
 
 
@@ -111,7 +111,7 @@ def test_a_network_camera_gives_what_it_sees(pictures: list[bytes], caplog: pyte
         expected = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_GRAYSCALE)
         assert expected is not None
         assert isinstance(image, np.ndarray)
-        assert frame.name == str(number)
+        assert frame.name == f"{number:06d}"
         # Two decoders of JPEG, one of which goes through colours, on noise.
         assert np.abs(image.astype(float) - expected).mean() < 2
     times = [frame.time for frame, _ in shots]
@@ -121,13 +121,26 @@ def test_a_network_camera_gives_what_it_sees(pictures: list[bytes], caplog: pyte
     assert f"{len(pictures)} images came, 0 of them dropped" in caplog.text
 
 
+def test_every_so_many_images(pictures: list[bytes]) -> None:
+    with network_camera(pictures) as address:
+        (sequence,) = find_sequences([f"camera:{address}"], reading=Reading(every=5), endless=True)
+        assert sequence.recording is not None
+        assert [frame.name for frame, _ in sequence.recording.shots()] == ["000000", "000005", "000010"]
+
+
+def test_a_camera_has_neither_labels_nor_topics() -> None:
+    for reading in (Reading(labels=Path(__file__)), Reading(topic="/camera")):
+        with pytest.raises(SourceError, match="camera:0: is a camera, which has neither labels nor topics"):
+            find_sequences(["camera:0"], reading=reading, endless=True)
+
+
 def test_damaged_images_do_not_end_it(pictures: list[bytes]) -> None:
     damaged = [*pictures[:4], b"\xff\xd8 no image \xff\xd9", pictures[4][: len(pictures[4]) // 2], *pictures[6:]]
     with network_camera(damaged) as address:
         shots = list(Camera(address).shots())
     assert [int(frame.name) for frame, _ in shots] == [*range(len(pictures))]
     assert [isinstance(image, str) for _, image in shots] == [number in (4, 5) for number in range(len(pictures))]
-    assert shots[5][1] == f"camera:{address}: image 5 cannot be decoded"
+    assert shots[5][1] == f"camera:{address}: frame 000005 cannot be decoded"
 
 
 def test_nothing_of_opencv_or_ffmpeg_reaches_stderr(pictures: list[bytes]) -> None:
