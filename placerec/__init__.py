@@ -28,7 +28,7 @@ _ROOMS = {
         "read_beliefs",
         "read_transitions",
     ),
-    "placerec.model": ("Decoding", "Options", "calibrate", "load_recognizer", "train_lm", "update"),
+    "placerec.model": ("Decoding", "Options", "calibrate", "follow_live", "load_recognizer", "train_lm", "update"),
     "placerec.baselines": ("decode", "load_decoder"),
     "placerec.evaluation": ("evaluate", "evaluate_files", "inspect_decision"),
     "placerec.evaluation.compare": ("compare",),
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.checks import check_model
     from placerec.lm.inspection import inspect_model
-    from placerec.model import Decoding, Options, calibrate, load_recognizer, train_lm, update
+    from placerec.model import Decoding, Options, calibrate, follow_live, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
@@ -96,6 +96,7 @@ __all__ = [
     "filter_stream",
     "find_sequences",
     "fixed_transition",
+    "follow_live",
     "gist",
     "inspect_decision",
     "inspect_model",

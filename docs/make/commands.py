@@ -12,8 +12,7 @@ import click
 
 import placerec
 from placerec.cli import commands
-from placerec.cli.srilm import _EXAMPLES as EXAMPLES
-from placerec.cli.srilm import SRILM_COMMANDS, Tool
+from placerec.cli.srilm import EXAMPLES, SRILM_COMMANDS, Tool
 
 HEAD = """\
 # Commands

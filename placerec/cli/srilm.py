@@ -20,7 +20,7 @@ _PURPOSES = {
 }
 
 
-_EXAMPLES = {
+EXAMPLES = {
     "ngram-count": "-text train.txt -order 3 -wbdiscount -interpolate -lm train.lm",
     "ngram": "-order 3 -lm train.lm -ppl test.txt",
     "ngram-merge": "-write all.counts monday.counts tuesday.counts",
@@ -39,7 +39,7 @@ class Tool(click.Command):
             click.echo(
                 f"{_PURPOSES[str(self.name)]}\n\nIts options are SRILM's: docs/srilm.md, or -help, lists them.\n"
             )
-            click.echo(f"Example: placerec {self.name} {_EXAMPLES[str(self.name)]}")
+            click.echo(f"Example: placerec {self.name} {EXAMPLES[str(self.name)]}")
             ctx.exit()
         ctx.args = list(args)
         return ctx.args

@@ -35,7 +35,7 @@ def gist(
     orientations: Sequence[int] = (6, 6, 6, 6),
     blocks: int = 4,
 ) -> Floats:
-    """The GIST of one grey image: mean Gabor magnitude of every filter in every block (gist/spec.md).
+    """The GIST of one grey image: mean Gabor magnitude of every filter in every block (our GIST specification).
 
     image: (h, w), grey of 0..255, uint8, uint16 (taken as 0..65535) or float; any size from 8 x 8 on.
     size: None takes the image as it is, a number first squashes it to size x size.
@@ -63,7 +63,7 @@ def gist(
 
 
 def prefilter(values: Floats) -> Floats:
-    """Whitening and local contrast normalisation (gist/spec.md section 2): (h, w) of 0..255 to (h, w) float32."""
+    """Whitening and local contrast normalisation (section 2 of our GIST specification): (h, w) of 0..255 to (h, w) float32."""
     height, width = values.shape
     padded = _mirror(np.log(values + np.float32(1)), _MARGIN, _MARGIN, _MARGIN, _MARGIN)
     rows, columns = padded.shape
@@ -191,7 +191,7 @@ def _bank(rows: int, columns: int, orientations: tuple[int, ...]) -> tuple[Float
 
 
 def _filters(rows: int, columns: int, orientations: tuple[int, ...]) -> Iterator[Floats]:
-    """The Gabor transfer functions (gist/spec.md section 3), each (rows, columns, 2), finest scale first.
+    """The Gabor transfer functions (section 3 of our GIST specification), each (rows, columns, 2), finest scale first.
 
     They are real; every value is there twice, for the real and the imaginary part that it multiplies.
     """

@@ -42,7 +42,7 @@ def fit_image(gray: Gray, size: int, fit: str = "squash") -> Gray:
     """The image resized to (size, size), dtype kept: area average where it shrinks, linear where it grows.
 
     `squash` changes the aspect ratio and keeps every pixel; `crop` scales the shorter side to `size` and keeps the
-    centre (gist/spec.md section 1, LMgist). Raises VisionError for another fit or a size below 8.
+    centre (section 1 of our GIST specification, LMgist). Raises VisionError for another fit or a size below 8.
     """
     if fit not in FITS:
         raise VisionError(f"no fit is called {fit!r}; choose one of {', '.join(FITS)}")
