@@ -63,7 +63,7 @@ def gist(
 
 
 def prefilter(values: Floats) -> Floats:
-    """Whitening and local contrast normalisation (section 2 of our GIST specification): (h, w) of 0..255 to (h, w) float32."""
+    """Whitening and local contrast normalisation (section 2 of our GIST specification): (h, w) 0..255 to float32."""
     height, width = values.shape
     padded = _mirror(np.log(values + np.float32(1)), _MARGIN, _MARGIN, _MARGIN, _MARGIN)
     rows, columns = padded.shape
