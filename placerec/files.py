@@ -139,21 +139,42 @@ def encoded(path: Path, text: str) -> bytes:
 
 def read_text(path: Path, error: type[PlacerecError]) -> str:
     """The UTF-8 text of a file, gunzipped if its name ends in .gz; `error` names what cannot be read."""
-    try:
+    with _reading(path, error):
         data = Path(path).read_bytes()
         if Path(path).suffix == ".gz":
             data = gzip.decompress(data)
+    try:
         return data.decode()
     except UnicodeDecodeError as cause:
-        line = data.count(b"\n", 0, cause.start) + 1
-        byte = data[cause.start]
-        raise error(f"{path}:{line}: byte 0x{byte:02x} is not UTF-8; save the file as UTF-8") from cause
+        raise error(_not_utf8(path, data.count(b"\n", 0, cause.start) + 1, data[cause.start])) from cause
+
+
+def read_lines(path: Path, error: type[PlacerecError]) -> Iterator[str]:
+    """The lines of `read_text`, without their LF and a byte order mark, one at a time: the file may be of any size."""
+    path = Path(path)
+    with _reading(path, error), gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            try:
+                text = line.decode()
+            except UnicodeDecodeError as cause:
+                raise error(_not_utf8(path, number, line[cause.start])) from cause
+            yield text.removeprefix("\ufeff").removesuffix("\n") if number == 1 else text.removesuffix("\n")
+
+
+@contextmanager
+def _reading(path: Path, error: type[PlacerecError]) -> Iterator[None]:
+    try:
+        yield
     except FileNotFoundError as cause:
         raise error(f"{path}: no such file") from cause
     except IsADirectoryError as cause:
         raise error(f"{path}: is a folder, and a file is expected; name a file in it") from cause
     except (OSError, EOFError, zlib.error) as cause:
         raise error(f"{path}: cannot be read: {getattr(cause, 'strerror', None) or cause}") from cause
+
+
+def _not_utf8(path: Path, line: int, byte: int) -> str:
+    return f"{path}:{line}: byte 0x{byte:02x} is not UTF-8; save the file as UTF-8"
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from itertools import accumulate, pairwise
 from pathlib import Path
 
 from placerec.errors import LanguageModelError, ModelError, StreamError
-from placerec.files import held_folder, read_text, restore_folder, whole_folder
+from placerec.files import held_folder, read_text, restore_folder, whole_folder, write_text
 from placerec.frames.places import check_twins
 from placerec.lm import NgramCounts, count_ngrams
 from placerec.lm.count_sums import read_counts, subtract_counts
@@ -81,7 +81,8 @@ def update(
                     shutil.copyfile(source, target)
             for done, place in enumerate(changed, start=1):
                 lines, counts = _forgotten(old, new, place) if forget else _learned(old, new, place)
-                write_place(folder, place, "".join(lines), counts, old.vocabulary, old.options)
+                write_text(PlaceFiles.of(folder, place).sentences, "".join(lines))
+                write_place(folder, place, counts, old.vocabulary, old.options)
                 if progress:
                     progress(done, len(changed))
             write_model_json(folder, record.places, old.vocabulary, old.options, record)
