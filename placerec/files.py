@@ -4,6 +4,7 @@ import ctypes
 import errno
 import gzip
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -52,9 +53,10 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def sweep_files(path: Path) -> None:
     """Remove what killed runs of `whole_file` left beside `path`; what a run is writing now stays."""
-    start = PARTIAL.format(path.name)
+    # The eight characters are those of mkstemp; a journal's name has others.
+    name = re.compile(re.escape(PARTIAL.format(path.name)) + "[a-z0-9_]{8}" + re.escape(path.suffix))
     for entry in path.parent.iterdir():
-        if entry.name.startswith(start) and entry.suffix == path.suffix and entry.is_file():
+        if name.fullmatch(entry.name) and entry.is_file():
             lock = _lock(entry)
             if lock is not None:
                 entry.unlink(missing_ok=True)
