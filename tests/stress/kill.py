@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -176,11 +177,9 @@ def started(work: Callable[[], None], folder: Path) -> Callable[..., bool]:
     def wait(kill: bool = False) -> bool:
         if kill:
             # Until it has called setsid there is no such group.
-            for target in (lambda: os.killpg(child, signal.SIGKILL), lambda: os.kill(child, signal.SIGKILL)):
-                try:
-                    target()
-                except ProcessLookupError:
-                    continue
+            for end in (os.killpg, os.kill):
+                with suppress(ProcessLookupError):
+                    end(child, signal.SIGKILL)
         status = os.waitpid(child, 0)[1]
         if not os.WIFSIGNALED(status) and os.WEXITSTATUS(status):
             raise DisturbedError(f"exit code {os.WEXITSTATUS(status)}")
