@@ -42,7 +42,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     partial = Path(name)
     lock = _lock(partial)
     try:
-        with _writing(path):
+        with _writing(path, partial):
             yield partial
             partial.chmod(0o666 & ~_umask())
             partial.replace(target)
@@ -80,7 +80,7 @@ def whole_folder(path: Path, owned: tuple[str, ...]) -> Iterator[Path]:
         partial = Path(tempfile.mkdtemp(prefix=PARTIAL.format(target.name), dir=target.parent))
         lock = _lock(partial)
     try:
-        with _writing(path):
+        with _writing(path, partial):
             yield partial
             partial.chmod(0o777 & ~_umask())
             _check_replaceable(path, target, owned)
@@ -180,9 +180,14 @@ def _not_utf8(path: Path, line: int, byte: int) -> str:
 
 
 @contextmanager
-def _writing(path: Path) -> Iterator[None]:
+def _writing(path: Path, partial: Path | None = None) -> Iterator[None]:
+    """What the system refuses within is an OutputError that names `path`, also for what is still in `partial`."""
     try:
         yield
+    except OutputError as error:
+        if partial is None or str(partial) not in str(error):
+            raise
+        raise OutputError(str(error).replace(str(partial), str(path))) from error
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
