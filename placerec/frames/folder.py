@@ -54,7 +54,7 @@ def list_folder(folder: Path) -> Listing:
             for entry in entries:
                 if entry.name.startswith("."):
                     continue
-                if entry.is_dir():
+                if _is_folder(entry):
                     folders.append(entry.name)
                 elif entry.name.lower().endswith(SUFFIXES):
                     images.append(entry.name)
@@ -72,6 +72,14 @@ def stamp(name: str) -> float | None:
         return found[0]
     named = idol.parse_name(name)
     return None if named is None else named.time
+
+
+def _is_folder(entry: "os.DirEntry[str]") -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:
+        # A link to itself: as an image it is named, and skipped.
+        return False
 
 
 def read_frames(folder: Path, images: Iterable[str], *, labels: PlaceList | None = None, place: str = "") -> FileFrames:

@@ -1,6 +1,6 @@
 """Commands that are killed at random moments and run again: the same bytes as undisturbed, and nothing else is left.
 
-    python tests/stress/kill.py [--kills 20] [--seed 0] [--jobs 2] [COMMAND...]
+    python tests/stress/kill.py [--kills 20] [--seed 0] [--jobs 2] [--small] [COMMAND...]
 
 Each time the process and its workers are killed together (SIGKILL to the group); then the command is run to its end.
 Processes are forked from this one, which has imported everything: no moment is spent on the start of Python.
@@ -14,7 +14,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -61,13 +61,15 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", default="2")
+    parser.add_argument("--small", action="store_true", help="fewer frames and cells")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         world = Path(folder).resolve()
         os.environ["TMPDIR"] = str(world / "tmp")
-        make_world(world)
+        chosen = given.commands or list(COMMANDS)
+        make_world(world, chosen, small=given.small)
         say(ROW.format(*COLUMNS))
-        for name in given.commands or COMMANDS:
+        for name in chosen:
             tally = disturb(name, given.jobs, world, given.kills, random.Random(f"{given.seed} {name}"))
             say(tally.row(name))
             if tally.same != tally.kills or tally.litter:
@@ -79,22 +81,27 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
-def make_world(world: Path) -> None:
-    """Images, a dictionary of them, token streams, a model, and an experiment's grid."""
-    for module in ("matplotlib.pyplot", "placerec.experiments", "placerec.words.tokenize"):
-        import_module(module)
+def make_world(world: Path, chosen: Sequence[str], *, small: bool) -> None:
+    """What the commands read: images, a dictionary of them, token streams, a model, an experiment's grid."""
     (world / "tmp").mkdir()
+    for seed in range(1 if small else 3):
+        write_images(world / "runs" / f"run{seed}", seed, frames=320 if small else 128)
     for seed in range(3):
-        write_images(world / "runs" / f"run{seed}", seed, frames=128)
-        write_images(world / "few" / f"run{seed}", seed, frames=24)
-    for number in range(60):
+        write_images(world / "few" / f"run{seed}", seed, frames=6 if small else 24)
+    for number in range(20 if small else 60):
         write_stream(run_through(f"run{number:02d}", number, 600), world / "tokens" / f"run{number:02d}.tsv")
     write_stream(run_through("today", 99, 3000), world / "today.tsv")
     write_vocabulary([f"w{i:02d}" for i in range(12)], world / "tokens" / "vocab.txt")
     grid = '[data]\nsequences = ["few/*"]\ntest = ["run2"]\n[grid]\norder = [1, 2]\nsmoothing = ["witten-bell"]\n'
-    (world / "grid.toml").write_text(grid + 'select = ["none", "unique"]\nsize = [2, 3]\nseeds = 2\n')
-    for name, args in (("words.npz", ("train-words", "runs", "--size", "4", "--image-size", "32")), ("model", TRAIN)):
-        started(typed(*args, "-o", name), world)()
+    sizes = "size = [2]\nseeds = 1\n" if small else "size = [2, 3]\nseeds = 2\n"
+    (world / "grid.toml").write_text(grid + 'select = ["none", "unique"]\n' + sizes)
+    if "tokenize" in chosen:
+        started(typed("train-words", "runs", "--size", "4", "--image-size", "32", "-o", "words.npz"), world)()
+    if "update" in chosen:
+        started(typed(*TRAIN, "-o", "model"), world)()
+    modules = ("placerec.words.tokenize", "placerec.experiments", "matplotlib.pyplot")
+    for module in modules if "experiment" in chosen else modules[:1]:
+        import_module(module)
 
 
 def typed(*args: str) -> Callable[[], None]:
