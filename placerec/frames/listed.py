@@ -2,7 +2,6 @@
 
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from operator import eq
 from pathlib import Path
 from typing import overload
 
@@ -93,7 +92,12 @@ class FileFrames(Sequence[Frame]):
         return Frame(name, self._times[row], self._places[row], self._folder / name)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, FileFrames) and len(self) == len(other) and all(map(eq, self, other))
+        return isinstance(other, FileFrames) and self._content() == other._content()
 
     def __hash__(self) -> int:
         return hash((self._folder, len(self)))
+
+    def _content(self) -> tuple[Path, bytes, list[tuple[str, str]]]:
+        # Times as bytes: an unknown one (nan) equals another.
+        times = array("d", (self._times[row] for row in self._rows)).tobytes()
+        return self._folder, times, [(self._names[row], self._places[row]) for row in self._rows]
