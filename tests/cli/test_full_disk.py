@@ -31,7 +31,6 @@ COMMANDS = {
     "show-words": ("show-words", "words.npz", "runs/seq1", "-o", "OUT/words.png"),
     "show-frame": ("show-frame", "IMAGE", "-w", "words.npz", "-o", "OUT/frame.png"),
     "demo": ("demo", "-o", "OUT/demo"),
-    "ngram-count": ("ngram-count", "-text", "model/sentences/hall.txt", "-lm", "OUT/hall.lm"),
 }
 
 
