@@ -4,6 +4,7 @@ import ctypes
 import errno
 import gzip
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -41,7 +42,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     partial = Path(name)
     lock = _lock(partial)
     try:
-        with _writing(path):
+        with _writing(path, partial):
             yield partial
             partial.chmod(0o666 & ~_umask())
             partial.replace(target)
@@ -52,9 +53,10 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def sweep_files(path: Path) -> None:
     """Remove what killed runs of `whole_file` left beside `path`; what a run is writing now stays."""
-    start = PARTIAL.format(path.name)
+    # The eight characters are those of mkstemp; a journal's name has others.
+    name = re.compile(re.escape(PARTIAL.format(path.name)) + "[a-z0-9_]{8}" + re.escape(path.suffix))
     for entry in path.parent.iterdir():
-        if entry.name.startswith(start) and entry.suffix == path.suffix and entry.is_file():
+        if name.fullmatch(entry.name) and entry.is_file():
             lock = _lock(entry)
             if lock is not None:
                 entry.unlink(missing_ok=True)
@@ -78,7 +80,7 @@ def whole_folder(path: Path, owned: tuple[str, ...]) -> Iterator[Path]:
         partial = Path(tempfile.mkdtemp(prefix=PARTIAL.format(target.name), dir=target.parent))
         lock = _lock(partial)
     try:
-        with _writing(path):
+        with _writing(path, partial):
             yield partial
             partial.chmod(0o777 & ~_umask())
             _check_replaceable(path, target, owned)
@@ -139,15 +141,32 @@ def encoded(path: Path, text: str) -> bytes:
 
 def read_text(path: Path, error: type[PlacerecError]) -> str:
     """The UTF-8 text of a file, gunzipped if its name ends in .gz; `error` names what cannot be read."""
-    try:
+    with _reading(path, error):
         data = Path(path).read_bytes()
         if Path(path).suffix == ".gz":
             data = gzip.decompress(data)
+    try:
         return data.decode()
     except UnicodeDecodeError as cause:
-        line = data.count(b"\n", 0, cause.start) + 1
-        byte = data[cause.start]
-        raise error(f"{path}:{line}: byte 0x{byte:02x} is not UTF-8; save the file as UTF-8") from cause
+        raise error(_not_utf8(path, data.count(b"\n", 0, cause.start) + 1, data[cause.start])) from cause
+
+
+def read_lines(path: Path, error: type[PlacerecError]) -> Iterator[str]:
+    """The lines of `read_text`, without their LF and a byte order mark, one at a time: the file may be of any size."""
+    path = Path(path)
+    with _reading(path, error), gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            try:
+                text = line.decode()
+            except UnicodeDecodeError as cause:
+                raise error(_not_utf8(path, number, line[cause.start])) from cause
+            yield text.removeprefix("\ufeff").removesuffix("\n") if number == 1 else text.removesuffix("\n")
+
+
+@contextmanager
+def _reading(path: Path, error: type[PlacerecError]) -> Iterator[None]:
+    try:
+        yield
     except FileNotFoundError as cause:
         raise error(f"{path}: no such file") from cause
     except IsADirectoryError as cause:
@@ -156,10 +175,19 @@ def read_text(path: Path, error: type[PlacerecError]) -> str:
         raise error(f"{path}: cannot be read: {getattr(cause, 'strerror', None) or cause}") from cause
 
 
+def _not_utf8(path: Path, line: int, byte: int) -> str:
+    return f"{path}:{line}: byte 0x{byte:02x} is not UTF-8; save the file as UTF-8"
+
+
 @contextmanager
-def _writing(path: Path) -> Iterator[None]:
+def _writing(path: Path, partial: Path | None = None) -> Iterator[None]:
+    """What the system refuses within is an OutputError that names `path`, also for what is still in `partial`."""
     try:
         yield
+    except OutputError as error:
+        if partial is None or str(partial) not in str(error):
+            raise
+        raise OutputError(str(error).replace(str(partial), str(path))) from error
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 

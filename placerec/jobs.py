@@ -79,7 +79,7 @@ def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few
     call = partial(_call, log.getEffectiveLevel())
     with _Workers(jobs, function) as pool:
         try:
-            for result, records in _ahead(pool, lambda item: pool.submit(call, item), chain(first, rest), 4 * jobs):
+            for result, records in _ahead(pool, partial(_submit, pool, call), chain(first, rest), 4 * jobs):
                 for record in records:
                     log.handle(record)
                 yield result
@@ -108,6 +108,17 @@ class _Workers(ProcessPoolExecutor):
         super().__init__(jobs, mp_context=spawn, initializer=_begin, initargs=(function,))
 
 
+def _submit(pool: Executor, call: Callable[[T], R], item: T) -> "Future[R]":
+    """Hand out an item; a process that this starts meets Ctrl-C only once `_begin` has told it how to end."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return pool.submit(call, item)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return pool.submit(call, item)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 _function: Callable[..., Any]
 
 
@@ -116,6 +127,8 @@ def _begin(function: Callable[..., Any]) -> None:
     global _function
     _function = function
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_after, args=(parent.join,), daemon=True).start()

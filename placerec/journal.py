@@ -11,8 +11,8 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import blake2b
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 from placerec.errors import OutputError
 from placerec.files import PARTIAL, sweep_files
@@ -27,7 +27,7 @@ _HEAD = struct.Struct("<16sQQ")
 class Journal:
     """Results in their order, each under the key that says what it was made from."""
 
-    def __init__(self, file: BinaryIO, path: Path) -> None:
+    def __init__(self, file: FileIO, path: Path) -> None:
         self._file, self._path = file, path
         self._at = 0
 
@@ -47,8 +47,9 @@ class Journal:
             if self._file.seek(0, os.SEEK_END) != self._at:
                 self._file.truncate(self._at)
                 self._file.seek(self._at)
-            self._file.write(blake2b(rest, digest_size=16).digest() + rest)
-            self._file.flush()
+            left = memoryview(blake2b(rest, digest_size=16).digest() + rest)
+            while left:
+                left = left[self._file.write(left) :]
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written: {error.strerror or error}") from error
         self._at = self._file.tell()
@@ -88,21 +89,22 @@ def open_journal(output: Path) -> Iterator[Journal]:
             path.unlink(missing_ok=True)
 
 
-def _opened(path: Path, output: Path) -> tuple[BinaryIO, bool]:
+def _opened(path: Path, output: Path) -> tuple[FileIO, bool]:
     """The file to write to, and whether it is `path`."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # A link there is none of ours.
-        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600), "r+b")
+        # A link there is none of ours. Without a buffer: what does not fit must not be tried again when it is closed.
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+        file = os.fdopen(handle, "r+b", buffering=0)
         if _lock(file):
             return file, True
         file.close()
-        return tempfile.TemporaryFile(dir=path.parent), False
+        return tempfile.TemporaryFile(dir=path.parent, buffering=0), False
     except OSError as error:
         raise OutputError(f"{output}: cannot be written: {error.strerror or error}") from error
 
 
-def _lock(file: BinaryIO) -> bool:
+def _lock(file: FileIO) -> bool:
     if sys.platform == "win32":
         return True
     try:
@@ -115,7 +117,7 @@ def _lock(file: BinaryIO) -> bool:
     return True
 
 
-def _read(file: BinaryIO) -> tuple[bytes, bytes] | None:
+def _read(file: FileIO) -> tuple[bytes, bytes] | None:
     head = file.read(_HEAD.size)
     if len(head) < _HEAD.size:
         return None

@@ -1,16 +1,18 @@
 """Work in several processes: order, notes, failures, and no process that outlives its parent."""
 
+import itertools
 import logging
 import os
 import subprocess
 import sys
 import time
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
 
 from placerec.errors import PlacerecError, StreamError
-from placerec.jobs import map_jobs, processors
+from placerec.jobs import FEW, map_jobs, processors, workers
 
 log = logging.getLogger("placerec.test")
 
@@ -98,3 +100,56 @@ def _runs(pid: int) -> bool:
     # Nobody waits for it any more: it may stay as an entry without a process.
     stat = Path(f"/proc/{pid}/stat")
     return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+def double(number: int) -> int:
+    return 2 * number
+
+
+def fail_late(number: int) -> int:
+    if number == 30:
+        raise StreamError("thirty")
+    return number
+
+
+@pytest.mark.parametrize("jobs", [None, 1, 2])
+def test_only_some_items_are_asked_for_ahead_of_the_results(jobs: int | None) -> None:
+    asked = 0
+
+    def endless() -> Iterator[int]:
+        nonlocal asked
+        while True:
+            asked += 1
+            yield asked
+
+    window = 8 + FEW if jobs else 2 * processors()
+    results = workers(jobs)(double, endless())
+    for number in range(1, 200):
+        assert next(results) == 2 * number
+        assert asked <= number + window + 1
+    if isinstance(results, Generator):
+        results.close()
+
+
+@pytest.mark.parametrize("jobs", [None, 1, 2])
+def test_an_exception_ends_the_work_where_it_comes(jobs: int | None) -> None:
+    results = workers(jobs)(fail_late, itertools.count())
+    assert list(itertools.islice(results, 30)) == list(range(30))
+    with pytest.raises(StreamError, match="thirty"):
+        next(results)
+
+
+@pytest.mark.parametrize("jobs", [None, 1, 2])
+def test_an_exception_of_the_items_comes_through(jobs: int | None) -> None:
+    def items() -> Iterator[int]:
+        yield from range(10)
+        raise StreamError("no more of them")
+
+    with pytest.raises(StreamError, match="no more of them"):
+        list(workers(jobs)(double, items()))
+
+
+@pytest.mark.parametrize("jobs", [None, 1, 2])
+@pytest.mark.parametrize("count", [0, 1, FEW - 1, 40])
+def test_any_number_of_items(jobs: int | None, count: int) -> None:
+    assert list(workers(jobs)(double, range(count))) == [2 * number for number in range(count)]

@@ -94,7 +94,7 @@ def train_models(look: Look, training: int, folder: Path) -> PlaceModels:
     path = folder / f"model-{digest(look.dictionary.fingerprint, __version__, *content)}"
     if not path.exists():
         sentences = [sentences_per_place([stream], Selection()) for stream in streams]
-        record = record_streams(streams, sentences, look.dictionary.fingerprint)
+        record = record_streams(zip(streams, sentences, strict=True), look.dictionary.fingerprint)
         train_model(
             sentences_per_place(streams, Selection()),
             look.dictionary.vocabulary,

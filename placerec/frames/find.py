@@ -86,11 +86,11 @@ def _read(item: _Found, name: str, reading: Reading, *, alone: bool) -> tuple[Se
             if from_vpc
             else read_places(item.places, frozenset(item.images))
         )
-    frames = read_frames(item.camera, item.images, labels=labels, place=item.place)[:: reading.every]
+    files = read_frames(item.camera, item.images, labels=labels, place=item.place)[:: reading.every]
     if labels:
-        return Sequence(name, frames, item.folder), labels.positions()
-    where = [(item.place, str(item.folder))] if item.place else [(f.place, str(f.path)) for f in frames if f.place]
-    return Sequence(name, frames, item.folder), where
+        return Sequence(name, files, item.folder), labels.positions()
+    where = [(item.place, str(item.folder))] if item.place else [(f.place, str(f.path)) for f in files if f.place]
+    return Sequence(name, files, item.folder), where
 
 
 def _is_recorded(item: _Found) -> bool:

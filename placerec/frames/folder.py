@@ -4,14 +4,17 @@ import logging
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from placerec.errors import SourceError
 from placerec.frames import bag, cold, idol, video
+from placerec.frames.listed import FileFrames, Labels
 from placerec.frames.places import PlaceList
-from placerec.frames.sequence import Frame
 
 log = logging.getLogger(__name__)
 
@@ -29,11 +32,15 @@ class Listing:
     folders: tuple[str, ...]
 
 
-def natural_key(name: str) -> tuple[list[str | int], str]:
+def natural_key(name: str) -> tuple[str, str]:
     """A sort key under which "img2" comes before "img10"; equal only for equal names."""
-    # re.split alternates text and digits, so that positions of two keys always compare like with like.
-    parts = re.split(r"([0-9]+)", name)
-    return [int(part) if k % 2 else part for k, part in enumerate(parts)], name
+    # A number is told by its length first, behind a character that is before all others and in no name.
+    return re.sub("[0-9]+", _number_key, name), name
+
+
+def _number_key(match: re.Match[str]) -> str:
+    digits = match[0].lstrip("0")
+    return f"\0{chr(1 + len(digits))}{digits}"
 
 
 def list_folder(folder: Path) -> Listing:
@@ -47,7 +54,7 @@ def list_folder(folder: Path) -> Listing:
             for entry in entries:
                 if entry.name.startswith("."):
                     continue
-                if entry.is_dir():
+                if _is_folder(entry):
                     folders.append(entry.name)
                 elif entry.name.lower().endswith(SUFFIXES):
                     images.append(entry.name)
@@ -67,42 +74,54 @@ def stamp(name: str) -> float | None:
     return None if named is None else named.time
 
 
-def read_frames(
-    folder: Path, images: Iterable[str], *, labels: PlaceList | None = None, place: str = ""
-) -> tuple[Frame, ...]:
+def _is_folder(entry: "os.DirEntry[str]") -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:
+        # A link to itself: as an image it is named, and skipped.
+        return False
+
+
+def read_frames(folder: Path, images: Iterable[str], *, labels: PlaceList | None = None, place: str = "") -> FileFrames:
     """The frames of `images` (file names in `folder`), in the order of their time stamps, else in natural order.
 
     Labels come from `labels`; without it from the names (KTH-IDOL2), else all are `place`. Raises SourceError where
     some names carry a time stamp and others do not.
     """
-    times = _times(folder, images)
-    timeless = any(map(math.isnan, times.values()))
-    order = sorted(times, key=natural_key if timeless else lambda name: (times[name], name))
-    if labels:
-        _report(labels, times)
-        known = labels.places
+    names = sorted(images)
+    times = _times(folder, names)
+    if np.isnan(times).any():
+        names.sort(key=natural_key)
     else:
-        known = {name: named.place if (named := idol.parse_name(name)) else place for name in order}
-    if not labels and not any(known.values()):
+        by_time = np.argsort(times, kind="stable")
+        names, times = [names[row] for row in by_time], times[by_time]
+    if labels:
+        _report(labels, names)
+        return FileFrames(folder, names, times, (labels.places.get(name, "") for name in names))
+    places = Labels(named.place if (named := idol.parse_name(name)) else place for name in names)
+    if not any(places):
         log.info("%s: no places.lst; its frames have no label", folder)
-    return tuple(Frame(name, times[name], known.get(name, ""), folder / name) for name in order)
+    return FileFrames(folder, names, times, places)
 
 
-def _times(folder: Path, images: Iterable[str]) -> dict[str, float]:
-    parsed = {name: stamp(name) for name in images}
-    timeless = [name for name, found in parsed.items() if found is None]
-    if 0 < len(timeless) < len(parsed):
-        first = folder / min(timeless, key=natural_key)
-        stamped = len(parsed) - len(timeless)
+def _times(folder: Path, images: Sequence[str]) -> NDArray[np.float64]:
+    """The seconds in the names, nan for all where none has any."""
+    stamps = (math.nan if (found := stamp(name)) is None else found for name in images)
+    times = np.fromiter(stamps, np.float64, len(images))
+    timeless = np.isnan(times)
+    if timeless.any() and not timeless.all():
+        first = folder / min((images[row] for row in np.flatnonzero(timeless).tolist()), key=natural_key)
+        stamped = len(images) - int(timeless.sum())
         raise SourceError(f"{first}: no time stamp in its name, and {stamped} images there have one; remove it")
-    return {name: math.nan if found is None else found for name, found in parsed.items()}
+    return times
 
 
-def _report(labels: PlaceList, images: dict[str, float]) -> None:
-    missing = [name for name in labels.places if name not in images]
-    if missing:
-        first = f"{missing[0]} in line {labels.lines[missing[0]]}"
-        log.warning("%s: %d of its images are missing (first: %s)", labels.path, len(missing), first)
-    unlabelled = sum(name not in labels.places for name in images)
-    if unlabelled:
-        log.info("%s: %d of %d images have no label", labels.path, unlabelled, len(images))
+def _report(labels: PlaceList, images: Sequence[str]) -> None:
+    labelled = sum(name in labels.places for name in images)
+    if labelled < len(labels.places):
+        there = frozenset(images)
+        missing = next(name for name in labels.places if name not in there)
+        first = f"{missing} in line {labels.lines[missing]}"
+        log.warning("%s: %d of its images are missing (first: %s)", labels.path, len(labels.places) - labelled, first)
+    if labelled < len(images):
+        log.info("%s: %d of %d images have no label", labels.path, len(images) - labelled, len(images))

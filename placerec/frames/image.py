@@ -1,6 +1,7 @@
 """An encoded image -> grey levels. Damage is looked for before decoding: OpenCV gives half a picture and no error."""
 
 import re
+import stat
 import struct
 import threading
 import zlib
@@ -18,21 +19,28 @@ from placerec.frames.sequence import Gray
 # cv2 is imported where it is used: listing frames must not cost its import.
 
 MIN_SIDE = 8
+MAX_PIXELS = 1 << 26
 _REMEDY = "copy it again or remove it"
 _JPEG = b"\xff\xd8\xff"
 _PNG = b"\x89PNG\r\n\x1a\n"
 # Within a scan FF is followed by 00 (a stuffed byte), D0-D7 (a restart) or FF (filling); anything else ends it.
 _SCAN_END = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
+# C4, C8 and CC are tables and extensions.
+_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _DEPTHS = (8, 10, 12, 14, 16)
 
 
 def read_gray(path: Path) -> Gray:
     """The grey levels 0..255 of an image file, (h, w), as `decode_gray` gives them.
 
-    Raises SourceError naming the file and the reason: missing, unreadable, and what `decode_gray` refuses.
+    Raises SourceError naming the file and the reason: missing, unreadable, a pipe, and what `decode_gray` refuses.
     """
     path = Path(path)
     try:
+        # A pipe would keep the work waiting for good.
+        mode = path.stat().st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            raise SourceError(f"{path}: is no regular file; remove it")
         data = path.read_bytes()
     except FileNotFoundError as error:
         raise SourceError(f"{path}: no such file") from error
@@ -48,7 +56,7 @@ def decode_gray(data: bytes, name: str) -> Gray:
     colours); alpha and colour profiles are ignored, EXIF orientation is applied. 16 bits: the depth in use is the
     least of 8, 10, 12, 14, 16 bits that holds the brightest pixel, and its top becomes 255 (full 16 bits: value / 257).
     Raises SourceError that begins with `name`: empty, truncated, damaged, no image, pixels of another type, a side
-    below 8 pixels.
+    below 8 pixels, more than MAX_PIXELS of them (PNG and JPEG).
     """
     if not data:
         raise SourceError(f"{name}: is empty; {_REMEDY}")
@@ -56,6 +64,7 @@ def decode_gray(data: bytes, name: str) -> Gray:
         _check_jpeg(name, data)
     elif data.startswith(_PNG):
         data = _plain_png(name, data)
+    _check_size(name, data)
     return as_gray(_decode(name, data), name)
 
 
@@ -84,6 +93,28 @@ def _decode(name: str, data: bytes) -> NDArray[Any]:
     if pixels is None:
         raise SourceError(f"{name}: is no image that OpenCV can decode; {_REMEDY}")
     return pixels
+
+
+def _check_size(name: str, data: bytes) -> None:
+    """Raise SourceError for a PNG or JPEG whose header promises more than MAX_PIXELS: a few bytes can be gigabytes."""
+    if data.startswith(_PNG):
+        width, height = struct.unpack_from(">II", data, 16)
+    elif data.startswith(_JPEG) and (frame := _jpeg_frame(data)):
+        height, width = struct.unpack_from(">HH", data, frame + 5)
+    else:
+        return
+    if width * height > MAX_PIXELS:
+        raise SourceError(f"{name}: is {width}x{height} pixels, and {MAX_PIXELS} in all are read; make it smaller")
+
+
+def _jpeg_frame(data: bytes) -> int:
+    """Where the frame's header (SOF) begins in a JPEG, 0 if there is none before the first scan."""
+    place = 2
+    while place + 9 <= len(data) and data[place] == 0xFF and data[place + 1] != 0xDA:
+        if data[place + 1] in _FRAMES:
+            return place
+        place += 1 if data[place + 1] == 0xFF else 2 + struct.unpack_from(">H", data, place + 2)[0]
+    return 0
 
 
 def _stretch(pixels: NDArray[np.uint16]) -> NDArray[np.float32]:

@@ -4,13 +4,14 @@ Grammar of places.lst (COLD, readings 4.1): one line per image, `<file name> <la
 UTF-8 with or without a byte order mark; LF or CRLF; lines in any order; blank lines mean nothing.
 """
 
+import sys
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from placerec.errors import SourceError, at
-from placerec.files import read_text
+from placerec.files import read_lines
 
 # The columns of the token and belief files, which stand beside the places there.
 COLUMNS = frozenset({"frame", "time", "place", "word", "distance", "selected", "best", "unknown"})
@@ -66,11 +67,12 @@ def read_places(path: Path, images: Collection[str] = ()) -> PlaceList:
     """
     places: dict[str, str] = {}
     lines: dict[str, int] = {}
-    # Not splitlines(): it would also split at form feeds and the like, and the line numbers would be wrong.
-    for number, line in enumerate(read_text(path, SourceError).removeprefix("\ufeff").split("\n"), start=1):
+    for number, line in enumerate(read_lines(path, SourceError), start=1):
         if not line.strip():
             continue
         image, place = _split(path, number, line.strip(), images)
+        # One string for all frames of a place.
+        place = sys.intern(place)
         if reason := check_place(place):
             raise SourceError(at(path, number, f"place {place!r} {reason}; rename it"))
         if places.setdefault(image, place) != place:

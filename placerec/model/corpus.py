@@ -2,8 +2,9 @@
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 
 from placerec.errors import StreamError
@@ -15,15 +16,21 @@ from placerec.words import (
     Selection,
     Sentences,
     WordStream,
-    read_sentences,
+    each_sentence,
     read_stream,
     read_vocabulary,
     sentences_per_place,
 )
+from placerec.words.stream import stream_name
 
 STREAM_SUFFIXES = (".tsv", ".tsv.gz")
 TOKENS_JSON = "tokens.json"
 VOCABULARY = "vocab.txt"
+REMEDY = "add it, or remove the line"
+# Sentences of a text that are in memory at one time.
+TOGETHER = 4096
+
+Keep = Callable[[str, Sentences], None]
 
 
 @dataclass(frozen=True)
@@ -61,13 +68,13 @@ def stream_files(sources: Iterable[Path | str]) -> list[Path]:
 
 def read_streams(sources: Iterable[Path | str]) -> list[WordStream]:
     """The token streams that `sources` name, with names of their own (StreamError for two of one name)."""
-    files = stream_files(sources)
-    streams = [read_stream(path) for path in files]
-    names = unique_names([(stream.name, path) for stream, path in zip(streams, files, strict=True)], StreamError)
-    return [
-        WordStream(name, s.frames, s.times, s.places, s.words, s.distances)
-        for name, s in zip(names, streams, strict=True)
-    ]
+    return list(_each_stream(stream_files(sources)))
+
+
+def _each_stream(files: Sequence[Path]) -> Iterator[WordStream]:
+    names = unique_names([(stream_name(path), path) for path in files], StreamError)
+    for name, path in zip(names, files, strict=True):
+        yield replace(read_stream(path), name=name)
 
 
 def holds_sentences(sources: Sequence[Path | str]) -> bool:
@@ -81,51 +88,76 @@ def read_corpus(
     *,
     selection: Selection,
     vocabulary: Path | str | None = None,
-    remedy: str = "add it, or remove the line",
+    remedy: str = REMEDY,
 ) -> Corpus:
-    """Read what to train on: token streams, or one folder of sentences (PLACE.txt, one visit a line).
+    """What to train on, in memory; as `gather_corpus` reads it."""
+    sentences: dict[str, Sentences] = {}
 
-    `vocabulary`: a vocab.txt; by default the one beside the streams, or in or beside the folder. Raises StreamError
-    for anything missing or broken, and for a word that the vocabulary lacks, with file, line and `remedy`.
+    def keep(place: str, text: Sentences) -> None:
+        sentences.setdefault(place, []).extend(text)
+
+    words, record = gather_corpus(sources, keep, selection=selection, vocabulary=vocabulary, remedy=remedy)
+    return Corpus(dict(sorted(sentences.items())), words, record)
+
+
+def gather_corpus(
+    sources: Sequence[Path | str],
+    keep: Keep,
+    *,
+    selection: Selection,
+    vocabulary: Path | str | None = None,
+    remedy: str = REMEDY,
+) -> tuple[Sequence[str], Record]:
+    """Read token streams or one folder of sentences (PLACE.txt, one visit a line): their vocabulary and record.
+
+    The sentences are handed to `keep`, a place and some of its sentences at a time, in order; one stream at a time is
+    in memory. `vocabulary`: a vocab.txt; by default the one beside the streams, or in or beside the folder. Raises
+    StreamError for anything missing or broken, and for a word that the vocabulary lacks, with file, line and `remedy`.
     """
     if holds_sentences(sources):
-        return _sentence_corpus(Path(sources[0]), vocabulary, remedy)
+        return _gather_sentences(Path(sources[0]), keep, vocabulary, remedy)
     files = stream_files(sources)
     words = read_vocabulary(vocabulary or _beside([path.parent for path in files]))
     made_by = dictionary_of(files)
-    streams = read_streams(sources)
-    for stream, path in zip(streams, files, strict=True):
-        _check_listed(stream.words, frozenset(words), path, remedy)
+    listed = frozenset(words)
     # The first file of each place is enough to tell where its name stands.
-    first = {place: path for stream, path in reversed([*zip(streams, files, strict=True)]) for place in stream.places}
-    check_twins((place, _position(path, "place", place)) for place, path in first.items() if place)
-    sentences = [sentences_per_place([stream], selection) for stream in streams]
-    record = record_streams(streams, sentences, made_by.fingerprint if made_by else None)
-    return Corpus(_joined(sentences), words, record)
+    first: dict[str, Path] = {}
+
+    def streams() -> Iterator[tuple[WordStream, Mapping[str, Sentences]]]:
+        for path, stream in zip(files, _each_stream(files), strict=True):
+            _check_listed(stream.words, listed, path, remedy)
+            sentences = sentences_per_place([stream], selection)
+            for place, text in sentences.items():
+                first.setdefault(place, path)
+                keep(place, text)
+            yield stream, sentences
+
+    record = record_streams(streams(), made_by.fingerprint if made_by else None)
+    check_twins((place, _position(path, "place", place)) for place, path in first.items())
+    return words, record
 
 
-def _joined(parts: Iterable[Mapping[str, Sentences]]) -> dict[str, Sentences]:
-    sentences: dict[str, Sentences] = {}
-    for part in parts:
-        for place, text in part.items():
-            sentences.setdefault(place, []).extend(text)
-    return dict(sorted(sentences.items()))
-
-
-def _sentence_corpus(folder: Path, vocabulary: Path | str | None, remedy: str) -> Corpus:
+def _gather_sentences(
+    folder: Path, keep: Keep, vocabulary: Path | str | None, remedy: str
+) -> tuple[Sequence[str], Record]:
     files = sorted((p for p in folder.iterdir() if p.suffix == ".txt" and p.name != VOCABULARY), key=lambda p: p.stem)
     if not files:
         raise StreamError(f"{folder}: holds neither token streams (.tsv) nor sentences (PLACE.txt)")
     words = read_vocabulary(vocabulary or _beside([folder, folder.resolve().parent]))
     check_twins((path.stem, str(path)) for path in files)
-    sentences = {}
+    listed = frozenset(words)
+    visits = {}
     for path in files:
         if reason := check_place(path.stem):
             raise StreamError(f"{path}: place {path.stem!r} {reason}; rename the file")
-        sentences[path.stem] = read_sentences(path)
-        _check_listed((word for visit in sentences[path.stem] for word in visit), frozenset(words), path, remedy)
-    visits = {place: len(text) for place, text in sentences.items()}
-    return Corpus(sentences, words, Record((LearnedSequence(folder.resolve().name, visits),)))
+        keep(path.stem, [])
+        visits[path.stem] = 0
+        sentences = each_sentence(path)
+        while some := list(islice(sentences, TOGETHER)):
+            _check_listed((word for visit in some for word in visit), listed, path, remedy)
+            keep(path.stem, some)
+            visits[path.stem] += len(some)
+    return words, Record((LearnedSequence(folder.resolve().name, visits),))
 
 
 def _check_listed(words: Iterable[str], listed: frozenset[str], path: Path, remedy: str) -> None:

@@ -1,5 +1,6 @@
 """What model.json keeps of the training sequences: integers only, so that adding and taking away is exact."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,7 @@ from placerec.hohmm.distances import Histogram, add_histograms, distance_histogr
 from placerec.words import Sentences, WordStream, place_steps, place_triples
 
 Steps = NDArray[np.int64]
+Route = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -52,26 +54,33 @@ class Record:
 NO_RECORD = Record()
 
 
-def record_streams(
-    streams: Sequence[WordStream], sentences: Iterable[Mapping[str, Sentences]], dictionary: str | None
-) -> Record:
-    """The record of token streams with the sentences per place of each."""
-    learned = tuple(
-        LearnedSequence(stream.name, {place: len(text) for place, text in its.items()})
-        for stream, its in zip(streams, sentences, strict=True)
-    )
-    places = Record(learned).places
-    transitions = np.zeros((len(places),) * 2, np.int64)
-    triples = np.zeros((len(places),) * 3, np.int64)
-    distances: dict[str, Histogram] = {place: {} for place in places}
-    for stream, sequence in zip(streams, learned, strict=True):
-        transitions += place_steps(stream, places)
-        triples += place_triples(stream, places)
+def record_streams(streams: Iterable[tuple[WordStream, Mapping[str, Sentences]]], dictionary: str | None) -> Record:
+    """The record of token streams, each with its sentences per place; one stream at a time is in memory."""
+    learned: list[LearnedSequence] = []
+    steps: tuple[Counter[Route], Counter[Route]] = Counter(), Counter()
+    distances: dict[str, Histogram] = {}
+    for stream, sentences in streams:
+        places = sorted(sentences)
+        learned.append(LearnedSequence(stream.name, {place: len(sentences[place]) for place in places}))
+        for total, found in zip(steps, (place_steps(stream, places), place_triples(stream, places)), strict=True):
+            seen = np.argwhere(found).tolist()
+            total.update({tuple(places[i] for i in route): int(found[tuple(route)]) for route in seen})
         labels = np.array(stream.places, np.str_)
-        for place in sequence.visits:
+        for place in places:
             histogram = distance_histogram(stream.distances[labels == place])
-            distances[place] = add_histograms(distances[place], histogram)
-    return Record(learned, dictionary, transitions, distances, triples)
+            distances[place] = add_histograms(distances.get(place, {}), histogram)
+    places = Record(tuple(learned)).places
+    transitions, triples = (_tabulated(counts, places, n) for n, counts in enumerate(steps, start=2))
+    return Record(tuple(learned), dictionary, transitions, {place: distances[place] for place in places}, triples)
+
+
+def _tabulated(counts: Mapping[Route, int], places: Sequence[str], n: int) -> Steps:
+    """Counts of routes over n places as int64 (C, C) or (C, C, C)."""
+    index = {place: i for i, place in enumerate(places)}
+    table = np.zeros((len(places),) * n, np.int64)
+    for route, count in counts.items():
+        table[tuple(index[place] for place in route)] = count
+    return table
 
 
 def add_record(record: Record, new: Record) -> Record:

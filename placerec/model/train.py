@@ -10,7 +10,7 @@ MODEL/nonevents.txt          without markers: what the `ngram-count` commands ne
 
 import json
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,15 +30,16 @@ from placerec.lm import (
 )
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
-from placerec.model.corpus import VOCABULARY, read_corpus
+from placerec.model.corpus import VOCABULARY, gather_corpus
 from placerec.model.record import NO_RECORD, Record, describe_record
 from placerec.version import __version__
-from placerec.words import Selection, Sentences, format_sentences, write_vocabulary
+from placerec.words import Selection, Sentences, each_sentence, format_sentences, write_vocabulary
 
 FORMAT = "placerec model 1"
 MODEL_JSON = "model.json"
 OWNED = ("*.arpa", MODEL_JSON, VOCABULARY, "nonevents.txt", "sentences", "counts")
 MAX_ORDER = 9
+NO_PLACE = "no labelled frame found: label the frames (places.lst, or one folder per place) to train"
 log = logging.getLogger(__name__)
 Progress = Callable[[int, int], None]
 
@@ -99,17 +100,24 @@ def train_lm(
     vocabulary: Path | str | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """`placerec train-lm`: read token streams or sentences (see `read_corpus`) and write a MODEL/ folder."""
-    corpus = read_corpus(tokens, selection=options.select, vocabulary=vocabulary)
-    train_model(
-        corpus.sentences,
-        corpus.vocabulary,
-        out,
-        options=options,
-        record=corpus.record,
-        progress=progress,
-    )
-    log.info("%s: %d places, order %d, %s", out, len(corpus.sentences), options.order, options.smoothing)
+    """`placerec train-lm`: read token streams or sentences (see `gather_corpus`) and write a MODEL/ folder.
+
+    Memory holds the model of one place and one stream; the sentences go to their files as they are read.
+    """
+    check_options(options)
+    with whole_folder(Path(out), OWNED) as folder:
+        (folder / "sentences").mkdir()
+
+        def keep(place: str, text: Sentences) -> None:
+            with PlaceFiles.of(folder, place).sentences.open("ab") as file:
+                file.write(format_sentences(text).encode())
+
+        words, record = gather_corpus(tokens, keep, selection=options.select, vocabulary=vocabulary)
+        if not record.places:
+            raise ModelError(NO_PLACE)
+        texts = {place: each_sentence(PlaceFiles.of(folder, place).sentences) for place in record.places}
+        _write_model(folder, texts, words, options, record, progress)
+    log.info("%s: %d places, order %d, %s", out, len(texts), options.order, options.smoothing)
 
 
 def train_model(
@@ -128,36 +136,47 @@ def train_model(
     """
     _check(sentences, vocabulary, options)
     with whole_folder(Path(out), OWNED) as folder:
-        begin_model(folder, vocabulary, options)
-        for done, (place, text) in enumerate(sentences.items(), start=1):
-            counts = count_ngrams(text, options.order, vocabulary=vocabulary, markers=options.markers)
-            write_place(folder, place, format_sentences(text), counts, vocabulary, options)
-            if progress:
-                progress(done, len(sentences))
-        write_model_json(folder, list(sentences), vocabulary, options, record)
+        for place, text in sentences.items():
+            write_text(PlaceFiles.of(folder, place).sentences, format_sentences(text))
+        _write_model(folder, sentences, vocabulary, options, record, progress)
+
+
+def _write_model(
+    folder: Path,
+    sentences: Mapping[str, Iterable[Sequence[str]]],
+    vocabulary: Sequence[str],
+    options: Options,
+    record: Record,
+    progress: Progress | None,
+) -> None:
+    """What MODEL/ holds beside the files of sentences, which are there."""
+    begin_model(folder, vocabulary, options)
+    for done, (place, text) in enumerate(sentences.items(), start=1):
+        counts = count_ngrams(text, options.order, vocabulary=vocabulary, markers=options.markers)
+        write_place(folder, place, counts, vocabulary, options)
+        if progress:
+            progress(done, len(sentences))
+    write_model_json(folder, list(sentences), vocabulary, options, record)
 
 
 def begin_model(folder: Path, vocabulary: Sequence[str], options: Options) -> None:
-    """Write into an empty MODEL/ folder what does not depend on the places."""
-    (folder / "sentences").mkdir()
+    """Write into a new MODEL/ folder what does not depend on the places."""
+    (folder / "sentences").mkdir(exist_ok=True)
     (folder / "counts").mkdir()
     write_vocabulary(vocabulary, folder / VOCABULARY)
     if not options.markers:
         write_text(folder / "nonevents.txt", SENTENCE_END + "\n")
 
 
-def write_place(
-    folder: Path, place: str, sentences: str, counts: NgramCounts, vocabulary: Sequence[str], options: Options
-) -> None:
-    """Write the files of one place into MODEL/: the text of its sentences, their counts, and the model of these."""
-    if not sentences:
+def write_place(folder: Path, place: str, counts: NgramCounts, vocabulary: Sequence[str], options: Options) -> None:
+    """Write into MODEL/, beside the sentences of one place, their counts, and the model of these."""
+    files = PlaceFiles.of(folder, place)
+    if not files.sentences.stat().st_size:
         log.warning("place %s: no visit holds a selected word; its model is uniform", place)
     try:
         model = estimate_place(counts, options)
     except LanguageModelError as error:
         raise LanguageModelError(f"place {place}: {error}") from error
-    files = PlaceFiles.of(folder, place)
-    write_text(files.sentences, sentences)
     write_text(files.counts, format_counts(counts))
     write_arpa(model, files.arpa, comment=signature(place, len(vocabulary), options))
 
@@ -244,7 +263,7 @@ def check_options(options: Options) -> None:
 def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: Options) -> None:
     check_options(options)
     if not sentences:
-        raise ModelError("no labelled frame found: label the frames (places.lst, or one folder per place) to train")
+        raise ModelError(NO_PLACE)
     for place in sentences:
         if reason := check_place(place):
             raise ModelError(f"place {place!r} {reason}; rename it")

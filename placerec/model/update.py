@@ -12,7 +12,7 @@ from itertools import accumulate, pairwise
 from pathlib import Path
 
 from placerec.errors import LanguageModelError, ModelError, StreamError
-from placerec.files import held_folder, read_text, restore_folder, whole_folder
+from placerec.files import held_folder, read_text, restore_folder, whole_folder, write_text
 from placerec.frames.places import check_twins
 from placerec.lm import NgramCounts, count_ngrams
 from placerec.lm.count_sums import read_counts, subtract_counts
@@ -60,9 +60,11 @@ def update(
     """`placerec update`: add the labelled visits in `tokens` to a MODEL/ folder, or take them away to `forget` them.
 
     `tokens`: token streams, or a folder of sentences if the model was trained on one. The folder then holds what
-    training on all sequences, the old ones first, would have written, without the calibration. Raises ModelError,
-    StreamError or LanguageModelError, and leaves the model as it was, for visits that do not belong to the model, for
-    sequences that it knows already (or not, to forget), and for a folder that was edited.
+    training on all sequences, the old ones first, would have written, without the calibration. It is replaced in one
+    step, and sequences that were all learned before, under the same names with the same sentences, change nothing:
+    whoever was killed may run it again. Raises ModelError, StreamError or LanguageModelError, and leaves the model as
+    it was, for visits that do not belong to the model, for others of a name that it knows already (or for a name that
+    it does not know, to forget), and for a folder that was edited.
     """
     path = Path(model)
     restore_folder(path)
@@ -71,6 +73,9 @@ def update(
     with held_folder(path):
         old = _read_model(path)
         new = _read_visits(tokens, old)
+        if not forget and _knows(old, new):
+            log.info("%s: has learned %s already; nothing is changed", path, ", ".join(new.record.names))
+            return
         record = _without(old, new.record) if forget else _with(old, new.record)
         former = set(old.record.places)
         changed = [place for place in record.places if new.sentences.get(place) or place not in former]
@@ -81,7 +86,8 @@ def update(
                     shutil.copyfile(source, target)
             for done, place in enumerate(changed, start=1):
                 lines, counts = _forgotten(old, new, place) if forget else _learned(old, new, place)
-                write_place(folder, place, "".join(lines), counts, old.vocabulary, old.options)
+                write_text(PlaceFiles.of(folder, place).sentences, "".join(lines))
+                write_place(folder, place, counts, old.vocabulary, old.options)
                 if progress:
                     progress(done, len(changed))
             write_model_json(folder, record.places, old.vocabulary, old.options, record)
@@ -119,6 +125,20 @@ def _read_visits(tokens: Sequence[Path | str], old: _Model) -> Corpus:
         check_dictionary(stream_files(tokens), old.record.dictionary, old.path)
     remedy = f"tokenize as {old.path} was, or train a model on all words"
     return read_corpus(tokens, selection=old.options.select, vocabulary=old.path / VOCABULARY, remedy=remedy)
+
+
+def _knows(old: _Model, new: Corpus) -> bool:
+    """Whether the model has learned these very sequences."""
+    visits = {sequence.name: sequence.visits for sequence in old.record.sequences}
+    if not new.record.names or any(visits.get(s.name) != s.visits for s in new.record.sequences):
+        return False
+    for place in new.record.places:
+        text = read_text(PlaceFiles.of(old.path, place).sentences, ModelError)
+        blocks = _blocks(old.record, place, text.splitlines(keepends=True))
+        its = _blocks(new.record, place, _lines(new, place))
+        if any(blocks[name] != block for name, block in its.items()):
+            return False
+    return True
 
 
 def _with(old: _Model, new: Record) -> Record:

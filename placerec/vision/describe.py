@@ -1,6 +1,7 @@
 """Sequences -> descriptors: every frame is read, described and forgotten."""
 
 import logging
+from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,12 +13,13 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.frames import Frame, Sequence
+from placerec.frames.listed import Labels, Texts
 from placerec.jobs import Map, Progress
 from placerec.journal import Journal
 from placerec.vision.external import read_rows
 from placerec.vision.gist import Floats
 from placerec.vision.spec import DescriptorSpec, check_describes_images
-from placerec.vision.storage import Pieces, write_npz
+from placerec.vision.storage import Column, Pieces, text_column, write_npz
 from placerec.vision.work import Answer, Tally, answers, describe_batch
 
 log = logging.getLogger(__name__)
@@ -75,12 +77,12 @@ def describe(
 
 @dataclass
 class Listing:
-    """The frames that have a descriptor, as they are found."""
+    """The frames that have a descriptor, as they are found, in little memory."""
 
-    frames: list[str] = field(default_factory=list)
-    sequences: list[str] = field(default_factory=list)
-    times: list[float] = field(default_factory=list)
-    places: list[str] = field(default_factory=list)
+    frames: Texts = field(default_factory=Texts)
+    sequences: Labels = field(default_factory=Labels)
+    times: "array[float]" = field(default_factory=lambda: array("d"))
+    places: Labels = field(default_factory=Labels)
     tally: Tally = field(default_factory=Tally)
 
     def add(self, sequence: str, frame: Frame) -> None:
@@ -165,26 +167,27 @@ def save_descriptors(descriptors: Descriptors, path: Path | str) -> None:
 
 
 def save_kept(journal: Journal, listing: Listing, spec: DescriptorSpec, path: Path | str) -> None:
-    """`save_descriptors` of what `described` left in a journal; only the names are in memory."""
+    """`save_descriptors` of what `described` left in a journal; only the listing is in memory."""
     values = Pieces((len(listing.frames), spec.length), lambda: kept_rows(journal))
-    _save(path, spec, values, listing.columns(), listing.tally.skipped, listing.tally.constant)
+    columns = listing.frames, listing.sequences, np.array(listing.times), listing.places
+    _save(path, spec, values, columns, listing.tally.skipped, listing.tally.constant)
 
 
 def _save(
     path: Path | str,
     spec: DescriptorSpec,
     values: Floats | Pieces,
-    columns: tuple[tuple[str, ...], tuple[str, ...], NDArray[np.float64], tuple[str, ...]],
+    columns: tuple[Column, Column, NDArray[np.float64], Column],
     skipped: int,
     constant: int,
 ) -> None:
     frames, sequences, times, places = columns
     arrays: dict[str, Any] = {
         "descriptors": values,
-        "frames": np.array(frames, np.str_),
-        "sequences": np.array(sequences, np.str_),
+        "frames": text_column(frames),
+        "sequences": text_column(sequences),
         "times": times,
-        "places": np.array(places, np.str_),
+        "places": text_column(places),
     }
     meta = {"format": "placerec-descriptors", "version": 1, "descriptor": spec.as_dict()}
     write_npz(Path(path), arrays, meta | {"skipped": skipped, "constant": constant})

@@ -7,8 +7,9 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,38 @@ from numpy.typing import NDArray
 from placerec.errors import VisionError
 from placerec.files import whole_file
 
+# Strings of a column that are in memory at one time.
+TOGETHER = 4096
 Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A float32 matrix that is not in memory: `pieces()` gives all of its rows, in order."""
+    """An array that is not in memory: `pieces()` gives all of its rows, in order; `dtype` as in npy files."""
 
-    shape: tuple[int, int]
-    pieces: Callable[[], Iterable[NDArray[np.float32]]]
+    shape: tuple[int, ...]
+    pieces: Callable[[], Iterable[NDArray[Any]]]
+    dtype: str = "<f4"
+
+
+class Column(Protocol):
+    """Strings that can be gone through again and again."""
+
+    def __len__(self) -> int: ...
+
+    def __iter__(self) -> Iterator[str]: ...
+
+
+def text_column(texts: Column) -> Pieces:
+    """Strings as an array of them, as numpy makes it of a list."""
+    dtype = f"<U{max(1, max(map(len, texts), default=0))}"
+
+    def pieces() -> Iterator[NDArray[np.str_]]:
+        rest = iter(texts)
+        while some := list(islice(rest, TOGETHER)):
+            yield np.array(some, dtype)
+
+    return Pieces((len(texts),), pieces, dtype)
 
 
 def write_npz(path: Path, arrays: Mapping[str, NDArray[Any] | Pieces], meta: dict[str, Any]) -> None:
@@ -34,10 +58,10 @@ def write_npz(path: Path, arrays: Mapping[str, NDArray[Any] | Pieces], meta: dic
         for name, array in content.items():
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
                 if isinstance(array, Pieces):
-                    header = {"descr": "<f4", "fortran_order": False, "shape": array.shape}
+                    header = {"descr": array.dtype, "fortran_order": False, "shape": array.shape}
                     np.lib.format.write_array_header_1_0(file, header)
                     for piece in array.pieces():
-                        file.write(piece.astype("<f4", copy=False).tobytes())
+                        file.write(piece.astype(array.dtype, copy=False).tobytes())
                 else:
                     np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=False)
 

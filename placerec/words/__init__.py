@@ -4,6 +4,7 @@ from placerec.words.selection import Selection, parse_selection, select, selecto
 from placerec.words.sentences import (
     Sentences,
     continues,
+    each_sentence,
     format_sentences,
     place_steps,
     place_triples,
@@ -19,6 +20,7 @@ __all__ = [
     "Sentences",
     "WordStream",
     "continues",
+    "each_sentence",
     "format_sentences",
     "parse_selection",
     "place_steps",

@@ -3,14 +3,14 @@
 Grammar of `PLACE.txt`, plain SRILM text: `file = { word { " " word } NL }`.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import StreamError
-from placerec.files import read_text
+from placerec.files import read_lines
 from placerec.words.selection import Selection, select
 from placerec.words.stream import WordStream, check_word
 
@@ -105,9 +105,11 @@ def format_sentences(sentences: Sequence[Sequence[str]]) -> str:
 
 def read_sentences(path: Path | str) -> Sentences:
     """The sentences of a text file, one a line; blank lines and comment lines (##) are none, as in SRILM."""
-    lines = read_text(Path(path), StreamError).removeprefix("\ufeff").split("\n")
-    return [
-        [check_word(path, i, word) for word in line.split()]
-        for i, line in enumerate(lines, start=1)
-        if line.strip() and not line.startswith("##")
-    ]
+    return list(each_sentence(path))
+
+
+def each_sentence(path: Path | str) -> Iterator[list[str]]:
+    """`read_sentences`, one at a time."""
+    for i, line in enumerate(read_lines(Path(path), StreamError), start=1):
+        if line.strip() and not line.startswith("##"):
+            yield [check_word(path, i, word) for word in line.split()]

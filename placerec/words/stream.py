@@ -85,9 +85,7 @@ def read_stream(path: Path | str) -> WordStream:
     path = Path(path)
     lines = read_text(path, StreamError).removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
     header = lines[0].split("\t")
-    name = path.name.removesuffix(".gz").removesuffix(
-        path.with_suffix("").suffix if path.suffix == ".gz" else path.suffix
-    )
+    name = stream_name(path)
     if "word" not in header:
         if len(header) > 1 or "frame" in header:
             raise StreamError(at(path, 1, f"the header {lines[0]!r} has no column 'word'"))
@@ -112,6 +110,11 @@ def read_stream(path: Path | str) -> WordStream:
         tuple(check_word(path, i, word) for i, word in zip(line_numbers, column["word"], strict=True)),
         _numbers(path, line_numbers, "distance", column.get("distance", blank)),
     )
+
+
+def stream_name(path: Path) -> str:
+    """The name of the sequence in a file: that of the file, without .gz and the suffix before it."""
+    return Path(path.name.removesuffix(".gz")).stem
 
 
 def check_word(path: Path | str, line: int, word: str) -> str:

@@ -1,5 +1,6 @@
 """Every kind of image that is read, and every kind of damage that is named; nothing is written to stderr."""
 
+import os
 import struct
 import subprocess
 import sys
@@ -277,7 +278,20 @@ def test_a_header_that_promises_too_much(tmp_path: Path) -> None:
     data = encode(".png", GRAY)
     header = struct.pack(">II", 100_000, 100_000) + data[24:29]
     message = failure(write(tmp_path / "a.png", data[:8] + chunk(b"IHDR", header) + data[33:]))
-    assert message.startswith("OpenCV refuses it (")
+    assert message == "is 100000x100000 pixels, and 67108864 in all are read; make it smaller"
+    # One row more than OpenCV would be asked for; the same of a JPEG, whose size is behind other segments.
+    (tmp_path / "b.png").write_bytes(encode(".png", np.zeros((8193, 8192), np.uint8)))
+    assert failure(tmp_path / "b.png").startswith("is 8192x8193 pixels")
+    data = encode(".jpg", GRAY)
+    frame = data.index(b"\xff\xc0")
+    forged = data[: frame + 5] + struct.pack(">HH", 65_000, 65_500) + data[frame + 9 :]
+    assert failure(write(tmp_path / "a.jpg", forged)).startswith("is 65500x65000 pixels, and 67108864 in all are read")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such pipes there")
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "x.png")
+    assert failure(tmp_path / "x.png") == "is no regular file; remove it"
 
 
 def test_the_log_level_is_restored_by_the_last_of_many_threads(tmp_path: Path) -> None:

@@ -191,14 +191,27 @@ def test_a_calibration_is_dropped_with_a_warning(world: Path, caplog: pytest.Log
     assert contents(world / "model") == contents(world / "all")
 
 
+def test_an_update_that_was_done_is_not_done_again(world: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Whoever was killed cannot know whether it was done."""
+    before = contents(world / "model")
+    with caplog.at_level(logging.INFO, "placerec"):
+        update(world / "model", [world / "tokens/run2.tsv", world / "tokens/run1.tsv"])
+    assert caplog.messages == [f"{world / 'model'}: has learned run2, run1 already; nothing is changed"]
+    assert contents(world / "model") == before
+
+
 def test_names_tell_what_was_learned(world: Path) -> None:
     tokens = world / "tokens"
-    refused(
-        world,
-        f"run2: {world / 'model'} has learned a sequence of this name; rename",
-        tokens / "run3.tsv",
-        tokens / "run2.tsv",
-    )
+    known = f"run2: {world / 'model'} has learned a sequence of this name; rename"
+    refused(world, known, tokens / "run3.tsv", tokens / "run2.tsv")
+    # Of this name, as long, with as many visits: one word is another.
+    other = (tokens / "run2.tsv").read_text().split("\n")
+    fields = other[3].split("\t")
+    fields[3] = next(word for word in VOCABULARY if word != fields[3])
+    other[3] = "\t".join(fields)
+    (world / "new").mkdir()
+    (world / "new/run2.tsv").write_text("\n".join(other))
+    refused(world, known, world / "new/run2.tsv")
     refused(
         world,
         f"run3: {world / 'model'} never learned a sequence of this name; see its model.json",
