@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from placerec.vision.chunks import CHUNK, Rows, Source, chunks, stored
 from placerec.vision.describe import Descriptors
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
 from placerec.vision.quality import MapQuality, map_quality
-from placerec.vision.som import RULES, WIDTH, Progress, best_units, train_som
+from placerec.vision.som import RULES, WIDTH, Progress, Units, nearest_units, train_som
 from placerec.vision.spec import DescriptorSpec, descriptor
 from placerec.vision.storage import Arrays, fingerprint, read_npz, write_npz
 
@@ -137,7 +138,7 @@ class Dictionary:
         quality = Quality(frames or data.n, data.n, som.epochs, pca.explained, pca.needed, *errors)
         return cls(spec, pca, som.codebook, som.hits, training, quality)
 
-    @property
+    @cached_property
     def vocabulary(self) -> tuple[str, ...]:
         """The K words in index order: "w" and the index, zero-padded to the digits of K - 1."""
         digits = len(str(len(self.codebook) - 1))
@@ -162,9 +163,7 @@ class Dictionary:
         A frame's answer does not depend on the frames around it. Raises VisionError for unusable descriptors, and for
         `Descriptors` of another kind; of what kind a bare array is only its maker can know.
         """
-        return best_units(
-            self._codes(descriptors), self.codebook, self.hits > 0 if self.training.units == "live" else None
-        )
+        return nearest_units(self._codes(descriptors), self._units)
 
     def measure(self, descriptors: Rows | Descriptors) -> MapQuality:
         """How well the map represents these frames, for instance of recordings that trained nothing."""
@@ -192,6 +191,10 @@ class Dictionary:
         except VisionError as error:
             remedy = "name another" if str(error) == "no such file" else _REMEDY
             raise VisionError(f"{path}: {error}; {remedy}") from error
+
+    @cached_property
+    def _units(self) -> Units:
+        return Units.of(self.codebook, self.hits > 0 if self.training.units == "live" else None)
 
     def _codes(self, descriptors: Rows | Descriptors) -> Rows:
         if isinstance(descriptors, Descriptors):

@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,11 @@ class Pca:
     explained: float
     needed: int
 
+    @cached_property
+    def grid(self) -> NDArray[np.float64]:
+        """The components as `exact.product` takes them, (d, k)."""
+        return self.components.T.astype(np.float64)
+
 
 def moments(source: Source) -> Moments:
     """The moments of (n, d) float32 in one pass, from memory, a memory map or a stream; the same however it is cut."""
@@ -92,11 +98,10 @@ def fit_pca(data: Moments, components: int = 80) -> Pca:
 
 def project(rows: NDArray[np.float32], pca: Pca) -> NDArray[np.float32]:
     """Coordinates float32 (n, k) of rows (n, d); a row's are the same whatever other rows are there."""
-    grid = pca.components.T.astype(np.float64)
     codes = np.empty((len(rows), len(pca.components)), np.float32)
     for first in range(0, len(rows), CHUNK):
         piece = slice(first, first + CHUNK)
-        codes[piece] = exact.product(rows[piece] - pca.mean, grid)
+        codes[piece] = exact.product(rows[piece] - pca.mean, pca.grid)
     return codes
 
 

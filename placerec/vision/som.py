@@ -29,6 +29,28 @@ class Som:
     epochs: int
 
 
+@dataclass(frozen=True, eq=False)
+class Units:
+    """What the search for the nearest unit needs to know of a codebook, whatever the rows; made by `of`.
+
+    `among`: the indices of the units that may answer, None for all. `places` float32 (K, k): where these lie. `halves`
+    float32 (K,): half their squared norms, and `largest` the largest squared norm.
+    """
+
+    among: NDArray[np.int64] | None
+    places: Rows
+    halves: NDArray[np.float32]
+    largest: float
+
+    @classmethod
+    def of(cls, codebook: Rows, live: NDArray[np.bool_] | None = None) -> "Units":
+        """A codebook made ready; `live` (K,): the units to choose from, all by default."""
+        among = None if live is None else np.flatnonzero(live)
+        places = codebook if among is None else codebook[among]
+        norms = np.square(places, dtype=np.float64).sum(axis=1)
+        return cls(among, places, (norms / 2).astype(np.float32), float(norms.max()))
+
+
 def train_som(
     source: Source,
     size: int,
@@ -55,9 +77,9 @@ def train_som(
     codebook = _start(mean, deviation, size, rng)
     learn = {"batch": _batch, "online": _online}[rule]
     codebook, epochs = learn(source, n, codebook, rng, width, epochs, progress)
-    hits = np.zeros(size * size, np.int64)
+    hits, units = np.zeros(size * size, np.int64), Units.of(codebook)
     for rows in again(source, n):
-        hits += np.bincount(_search(rows, codebook), minlength=size * size)
+        hits += np.bincount(_search(rows, units), minlength=size * size)
     return Som(codebook, hits, epochs)
 
 
@@ -77,8 +99,9 @@ def _batch(
     for epoch in range(1, epochs + 1):
         sums, counts = np.zeros(codebook.shape), np.zeros(len(codebook))
         changed, first, distance = 0, 0, 0.0
+        ready = Units.of(codebook)
         for rows in again(source, n):
-            units = _search(rows, codebook)
+            units = _search(rows, ready)
             sums += _unit_sums(rows, units, len(codebook))
             counts += np.bincount(units, minlength=len(codebook))
             known = before[first : first + len(rows)]
@@ -139,22 +162,24 @@ def best_units(
 
     `live` (K,): units to choose from, all by default. Of equally near units the first is taken.
     """
-    if live is None:
-        units = _search(codes, codebook)
-    else:
-        among = np.flatnonzero(live)
-        units = among[_search(codes, codebook[among])]
-    return units, distances(codes, codebook, units).astype(np.float32)
+    return nearest_units(codes, Units.of(codebook, live))
+
+
+def nearest_units(codes: Rows, units: Units) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """`best_units` of a codebook that is ready: what a frame at a time would otherwise be computed for every frame."""
+    found = _search(codes, units)
+    far = distances(codes, units.places, found).astype(np.float32)
+    return found if units.among is None else units.among[found], far
 
 
 def quantisation_error(codes: Rows, codebook: Rows) -> float:
     """The mean distance of the rows to their nearest unit."""
-    return float(distances(codes, codebook, _search(codes, codebook)).mean())
+    return float(distances(codes, codebook, best_units(codes, codebook)[0]).mean())
 
 
 def topographic_error(codes: Rows, codebook: Rows) -> float:
     """The share of the rows whose second nearest unit is not one of the 8 neighbours of the nearest."""
-    return float(torn(codes, codebook, _search(codes, codebook)).mean())
+    return float(torn(codes, codebook, best_units(codes, codebook)[0]).mean())
 
 
 def torn(codes: Rows, codebook: Rows, nearest: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -162,7 +187,7 @@ def torn(codes: Rows, codebook: Rows, nearest: NDArray[np.int64]) -> NDArray[np.
     if len(codebook) == 1:
         return np.zeros(len(codes), np.bool_)
     size = round(len(codebook) ** 0.5)
-    second = _search(codes, codebook, without=nearest)
+    second = _search(codes, Units.of(codebook), without=nearest)
     down, right = nearest // size - second // size, nearest % size - second % size
     far: NDArray[np.bool_] = np.maximum(np.abs(down), np.abs(right)) > 1
     return far
@@ -218,34 +243,34 @@ def _smoothed(
     return moved
 
 
-def _search(codes: Rows, codebook: Rows, without: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+def _search(codes: Rows, units: Units, without: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
     """The nearest unit of every row, by exact distance in float64, lowest index first; `without` (n,): not this one."""
-    units = np.empty(len(codes), np.int64)
+    found = np.empty(len(codes), np.int64)
     for first in range(0, len(codes), CHUNK):
         piece = slice(first, first + CHUNK)
-        units[piece] = _search_chunk(codes[piece], codebook, None if without is None else without[piece])
-    return units
+        found[piece] = _search_chunk(codes[piece], units, None if without is None else without[piece])
+    return found
 
 
-def _search_chunk(codes: Rows, codebook: Rows, without: NDArray[np.int64] | None) -> NDArray[np.int64]:
+def _search_chunk(codes: Rows, ready: Units, without: NDArray[np.int64] | None) -> NDArray[np.int64]:
     """float32 products find the candidates; float64 decides where they are nearer to each other than rounding."""
-    norms = np.square(codebook, dtype=np.float64).sum(axis=1)
-    scores: NDArray[np.float32] = codes @ codebook.T
-    scores -= (norms / 2).astype(np.float32)
+    scores: NDArray[np.float32] = codes @ ready.places.T
+    scores -= ready.halves
     every = np.arange(len(codes))
     if without is not None:
         scores[every, without] = -np.inf
     units: NDArray[np.int64] = scores.argmax(axis=1)
     best = scores[every, units]
-    reach = np.sqrt(np.square(codes, dtype=np.float64).sum(axis=1) * norms.max()) + norms.max() / 2
+    reach = np.sqrt(np.square(codes, dtype=np.float64).sum(axis=1) * ready.largest) + ready.largest / 2
     bound = 2 * (codes.shape[1] + 2) * np.finfo(np.float32).eps * reach
     scores[every, units] = -np.inf
     doubtful = np.flatnonzero(scores.max(axis=1) >= best - bound)
     scores[every, units] = best
     # In pieces: where all units lie close together every unit is a candidate of every row.
-    for rows in np.array_split(doubtful, len(doubtful) // 128 + 1):
+    for first in range(0, len(doubtful), 128):
+        rows = doubtful[first : first + 128]
         which, unit = np.nonzero(scores[rows] >= (best[rows] - bound[rows])[:, None])
-        distance = distances(codes[rows[which]], codebook, unit)
+        distance = distances(codes[rows[which]], ready.places, unit)
         order = np.lexsort((unit, distance, which))
         leaders = order[np.unique(which[order], return_index=True)[1]]
         units[rows[which[leaders]]] = unit[leaders]

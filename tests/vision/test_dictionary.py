@@ -65,6 +65,20 @@ def test_a_word_does_not_depend_on_the_frames_around_it(dictionary: Dictionary) 
         assert (alone[0][0], alone[1][0]) == (unit, distance)
 
 
+def test_what_a_dictionary_remembers_changes_no_byte(dictionary: Dictionary) -> None:
+    """One frame at a time from a dictionary that has answered before, all frames from one that never has."""
+    rows = np.concatenate([sample(40, seed=1), dictionary.pca.mean[None].astype(np.float32)])
+    dictionary.words(rows)
+    fresh = replace(dictionary, pca=replace(dictionary.pca), codebook=dictionary.codebook.copy())
+    units, distances = fresh.words(rows)
+    singly = [dictionary.words(row[None]) for row in rows]
+    assert np.concatenate([unit for unit, _ in singly]).tobytes() == units.tobytes()
+    assert np.concatenate([distance for _, distance in singly]).tobytes() == distances.tobytes()
+    # Nothing of it is kept where the dictionary is another one.
+    dead = replace(dictionary, hits=np.where(np.arange(25) == units[0], 0, dictionary.hits))
+    assert dead.words(rows[:1])[0][0] != units[0]
+
+
 @pytest.mark.parametrize(("size", "first", "last"), [(1, "w0", "w0"), (3, "w0", "w8"), (10, "w00", "w99")])
 def test_vocabulary_is_padded_to_the_last_index(size: int, first: str, last: str) -> None:
     words = fit(size=size).vocabulary
