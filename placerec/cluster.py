@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain
 from tempfile import TemporaryDirectory
 from time import monotonic
@@ -40,7 +39,9 @@ _TALKERS = ("asyncio", "bokeh", "distributed", "tornado")
 def check_address(address: str) -> None:
     """JobError for what is no address of a cluster."""
     if not _LOCAL.fullmatch(address) and not _REMOTE.fullmatch(address):
-        raise JobError(f"{address!r} is no cluster; give tcp://HOST:PORT of a scheduler, or local:N for N processes here")
+        raise JobError(
+            f"{address!r} is no cluster; give tcp://HOST:PORT of a scheduler, or local:N for N processes here"
+        )
 
 
 @contextmanager
@@ -186,8 +187,9 @@ class _Dask:
         return each
 
     def _submitter(self, call: Callable[..., Any], function: Callable[..., Any]) -> Callable[[Any], Any]:
-        """What submits `call` of the function and something else; the scheduler has the function, and gives it again."""
-        name = f"placerec-{uuid4().hex}"
+        """What submits `call` of the function and something else; the function is with the scheduler."""
+        # Under the function's name the scheduler remembers how long its tasks take.
+        name = f"{getattr(getattr(function, 'func', function), '__name__', 'work').strip('_')}-{uuid4().hex}"
         known = self._client.submit(_known, __version__, _Item(function), key=f"{name}-function")
         numbers = iter(range(1 << 62))
         level = log.getEffectiveLevel()

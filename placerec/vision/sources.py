@@ -94,6 +94,7 @@ def train_dictionary(
             units=units,
             rule=rule,
             width=width,
+            work=work,
         )
         dictionary.save(unfinished)
         _report(dictionary)
