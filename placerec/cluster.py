@@ -6,13 +6,15 @@ kept for several functions lies with the workers, and is sent again if its worke
 
 import logging
 import re
+import signal
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, count
+from multiprocessing import resource_tracker
 from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any, Generic, TypeVar
@@ -92,18 +94,34 @@ def _talks(name: str) -> bool:
 @contextmanager
 def _local(distributed: Any, workers: int) -> Iterator[str]:
     """The address of a scheduler in this process, with workers in others; nothing of them is left."""
-    with (
-        TemporaryDirectory(prefix="placerec-") as folder,
-        distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            local_directory=folder,
-            silence_logs=logging.CRITICAL,
-        ) as made,
-    ):
-        yield made.scheduler_address
+    import dask
+
+    with TemporaryDirectory(prefix="placerec-") as folder, dask.config.set({"temporary-directory": folder}):
+        with _uninterrupted():
+            made = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            )
+        with made:
+            yield made.scheduler_address
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Threads and processes that begin here never see Ctrl-C, which a terminal sends to all: this thread ends them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # It is there before the first process, and where it begins it lets Ctrl-C in again.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -175,7 +193,8 @@ class _Dask:
         def place(group: int, lost: bool) -> Any:
             if lost or places[group] is None:
                 its = _Item([items[i] for i in groups[group]])
-                places[group] = self._client.scatter([its], hash=False)[0]
+                with self._reached():
+                    places[group] = self._client.scatter([its], hash=False)[0]
             return places[group]
 
         def each(function: Callable[[T], R], /) -> Iterator[R]:
@@ -191,8 +210,7 @@ class _Dask:
         # Under the function's name the scheduler remembers how long its tasks take.
         name = f"{getattr(getattr(function, 'func', function), '__name__', 'work').strip('_')}-{uuid4().hex}"
         known = self._client.submit(_known, __version__, _Item(function), key=f"{name}-function")
-        numbers = iter(range(1 << 62))
-        level = log.getEffectiveLevel()
+        numbers, level = count(), log.getEffectiveLevel()
         return lambda item: self._client.submit(call, known, item, level, key=(name, next(numbers)))
 
     def _results(self, tasks: Iterable[Task]) -> Iterator[Any]:
@@ -213,6 +231,7 @@ class _Dask:
     def _result(self, task: Task, future: Any) -> Any:
         """What a task gives; it is submitted again if what it needs was lost with a worker."""
         from distributed import KilledWorker
+        from distributed.comm import CommClosedError
 
         for _ in range(LOSSES):
             try:
@@ -221,9 +240,9 @@ class _Dask:
                 raise JobError(
                     f"{self._address}: several workers were killed at the same item; give them more memory"
                 ) from error
-            except CancelledError as error:
+            except (CancelledError, CommClosedError) as error:
                 if self._client.status != "running":
-                    raise JobError(f"{self._address}: the scheduler is gone; start it again") from error
+                    raise self._gone() from error
             future = task(True)
         raise JobError(f"{self._address}: workers are lost again and again; see what ends them")
 
@@ -240,4 +259,15 @@ class _Dask:
                     raise JobError(f"{self._address}: no worker is left; {remedy}") from error
 
     def _threads(self) -> int:
-        return sum(self._client.nthreads().values())
+        with self._reached():
+            return sum(self._client.nthreads().values())
+
+    @contextmanager
+    def _reached(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise self._gone() from error
+
+    def _gone(self) -> JobError:
+        return JobError(f"{self._address}: the scheduler is gone; start it again")

@@ -58,8 +58,8 @@ def far(work: Map | None) -> Map:
 
 
 def each_of(items: Sequence[T], work: Map | None) -> Each[T]:
-    """Maps functions over the items as `far` would; other machines are sent each item once."""
-    return work.keep(items) if isinstance(work, Far) else lambda function: map(function, items)
+    """Maps functions over the items as `far` would; other machines are sent each item once, if there are two."""
+    return work.keep(items) if isinstance(work, Far) and len(items) > 1 else lambda function: map(function, items)
 
 
 def processors() -> int:

@@ -1,0 +1,347 @@
+"""Work on a Dask cluster: a scheduler and workers in processes of their own, some of which are killed on the way."""
+
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from small import write_images, write_tokens
+
+import placerec
+from placerec import cluster as room
+from placerec.cli import commands
+from placerec.cluster import check_address, cluster
+from placerec.errors import MissingExtraError, StreamError
+from placerec.jobs import Each, Far, JobError, each_of
+from placerec.model import Options, train_lm
+from placerec.vision import DescriptorSpec, Dictionary, describe_sources, train_dictionary
+from placerec.words.tokenize import tokenize
+
+pytest.importorskip("distributed", reason="needs the extra: pip install 'placerec[cluster]'")
+
+SPEC = DescriptorSpec(image_size=16)
+ENVIRONMENT = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(Path(placerec.__file__).parent.parent), str(Path(__file__).parent)]),
+}
+T = TypeVar("T")
+R = TypeVar("R")
+log = logging.getLogger("placerec.test")
+
+
+class Machines:
+    """A scheduler and its workers, on this machine."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.workers: list[subprocess.Popen[bytes]] = []
+        file = folder / "scheduler.json"
+        self.scheduler = self._start("scheduler", "--port", "0", "--scheduler-file", str(file))
+        _wait_until(lambda: file.exists() and "}" in file.read_text(), "the scheduler never began")
+        self.address: str = json.loads(file.read_text())["address"]
+
+    def _start(self, kind: str, *options: str) -> "subprocess.Popen[bytes]":
+        common = ["--host", "127.0.0.1", "--no-dashboard"]
+        return subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.dask_{kind}", *options, *common],
+            env=ENVIRONMENT,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    def have(self, count: int) -> str:
+        """The address, once `count` workers are there."""
+        from distributed import Client
+
+        self.workers = [worker for worker in self.workers if worker.poll() is None]
+        options = ["--no-nanny", "--nthreads", "1", "--local-directory", str(self._folder)]
+        while len(self.workers) < count:
+            self.workers.append(self._start("worker", self.address, *options))
+        with Client(self.address, set_as_default=False) as client:
+            client.wait_for_workers(count, timeout=60)
+        return self.address
+
+    def kill(self, count: int = 1) -> None:
+        for worker in self.workers[:count]:
+            worker.kill()
+            worker.wait()
+
+    def close(self) -> None:
+        for process in [*self.workers, self.scheduler]:
+            process.kill()
+            process.wait()
+
+
+@contextmanager
+def machines_in(folder: Path) -> Iterator[Machines]:
+    machines = Machines(folder)
+    try:
+        yield machines
+    finally:
+        machines.close()
+
+
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
+    with machines_in(tmp_path_factory.mktemp("machines")) as made:
+        yield made
+
+
+class Dying:
+    """A cluster that loses a worker when `after` results have come, counted over all maps."""
+
+    def __init__(self, work: Far, machines: Machines, after: int) -> None:
+        self._work, self._machines, self._left = work, machines, after
+
+    def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
+        return self._counted(self._work(function, items))
+
+    def keep(self, items: Sequence[T], /) -> Each[T]:
+        each = self._work.keep(items)
+        return lambda function: self._counted(each(function))
+
+    def _counted(self, results: Iterator[R]) -> Iterator[R]:
+        for result in results:
+            self._left -= 1
+            if self._left == 0:
+                self._machines.kill()
+            yield result
+
+    @property
+    def died(self) -> bool:
+        return self._left <= 0
+
+
+@contextmanager
+def dying(machines: Machines, after: int) -> Iterator[Dying]:
+    """A cluster of two workers, one of which is killed; that it was is asserted."""
+    with cluster(machines.have(2)) as work:
+        lossy = Dying(work, machines, after)
+        yield lossy
+    assert lossy.died
+
+
+@pytest.fixture(autouse=True)
+def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nine batches of the images below, nine chunks of their descriptors; some words of a text."""
+    monkeypatch.setattr("placerec.frames.batches.SIZE", 8)
+    monkeypatch.setattr("placerec.vision.chunks.CHUNK", 8)
+    monkeypatch.setattr("placerec.lm.counts.BLOCK", 40)
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("images")
+    for seed, name in enumerate(("seq1", "seq2", "seq3")):
+        write_images(root / name, seed, frames=24)
+    return root
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    files = [path] if path.is_file() else [file for file in sorted(path.rglob("*")) if file.is_file()]
+    assert files
+    return {str(file.relative_to(path)): file.read_bytes() for file in files}
+
+
+def double(number: int) -> int:
+    if number == 7:
+        log.warning("seven")
+    return 2 * number
+
+
+def started(item: tuple[str, int]) -> int:
+    """Leaves a file that names the item and the process."""
+    folder, number = item
+    (Path(folder) / f"{number}-{os.getpid()}").touch()
+    time.sleep(0.05)
+    return number
+
+
+def refuse(number: int) -> int:
+    raise StreamError(f"{number} cannot be used; take another")
+
+
+def total(rows: Any) -> float:
+    return float(rows.sum())
+
+
+def test_results_and_notes_are_in_order_and_errors_come_through(
+    machines: Machines, caplog: pytest.LogCaptureFixture
+) -> None:
+    with cluster(machines.have(2)) as work:
+        with caplog.at_level(logging.INFO, "placerec"):
+            assert list(work(double, range(40))) == list(range(0, 80, 2))
+        assert caplog.messages == ["seven"]
+        assert list(work(double, [])) == []
+        with pytest.raises(StreamError, match="3 cannot be used; take another"):
+            list(work(refuse, [3, 4]))
+        assert next(work(double, iter(range(10**9)))) == 0
+
+
+def test_a_lost_worker_costs_only_its_share(machines: Machines, tmp_path: Path) -> None:
+    with dying(machines, after=10) as work:
+        lost = machines.workers[0].pid
+        assert list(work(started, [(str(tmp_path), number) for number in range(60)])) == list(range(60))
+    runs: dict[int, set[int]] = {}
+    for path in tmp_path.iterdir():
+        number, process = map(int, path.name.split("-"))
+        runs.setdefault(number, set()).add(process)
+    assert any(lost in processes for processes in runs.values())
+    again = [processes for processes in runs.values() if len(processes) > 1]
+    assert all(lost in processes for processes in again)
+    assert len(again) <= 2  # what it was at, and what lay ready there
+
+
+def test_what_is_kept_is_sent_again_when_its_worker_is_lost(machines: Machines) -> None:
+    items = [np.full((3, 2), number, np.float32) for number in range(20)]
+    with dying(machines, after=30) as work:
+        each = each_of(items, work)
+        for _ in range(4):
+            assert list(each(total)) == [6.0 * number for number in range(20)]
+
+
+def test_describe(machines: Machines, images: Path, tmp_path: Path) -> None:
+    describe_sources([images], tmp_path / "here.npz", spec=SPEC)
+    with dying(machines, after=4) as work:
+        describe_sources([images], tmp_path / "there.npz", spec=SPEC, work=work)
+    assert contents(tmp_path / "here.npz") == contents(tmp_path / "there.npz")
+
+
+@pytest.mark.parametrize("after", [5, 14, 50])
+def test_train_words(machines: Machines, images: Path, tmp_path: Path, after: int) -> None:
+    train_dictionary([images], tmp_path / "here.npz", spec=SPEC, size=5, epochs=6)
+    with dying(machines, after) as work:
+        train_dictionary([images], tmp_path / "there.npz", spec=SPEC, size=5, epochs=6, work=work)
+    assert contents(tmp_path / "here.npz") == contents(tmp_path / "there.npz")
+
+
+def test_tokenize(machines: Machines, images: Path, tmp_path: Path) -> None:
+    rows = np.random.default_rng(0).normal(size=(60, SPEC.length)).astype(np.float32)
+    Dictionary.fit(rows, spec=SPEC, size=4).save(tmp_path / "words.npz")
+    tokenize([images], tmp_path / "words.npz", tmp_path / "here")
+    with dying(machines, after=4) as work:
+        tokenize([images], tmp_path / "words.npz", tmp_path / "there", work=work)
+    assert contents(tmp_path / "here") == contents(tmp_path / "there")
+    options = ["-w", str(tmp_path / "words.npz"), "-o", str(tmp_path / "command"), "--cluster", machines.have(1)]
+    result = CliRunner().invoke(commands, ["tokenize", str(images), *options])
+    assert result.exit_code == 0, result.output
+    assert result.stderr.startswith("72 frames described, 0 skipped, 0 of one grey level throughout\n")
+    assert contents(tmp_path / "here") == contents(tmp_path / "command")
+
+
+@pytest.mark.parametrize("options", [Options(order=3), Options(smoothing="lidstone", markers=True, min_count=(1, 2))])
+def test_train_lm(machines: Machines, tmp_path: Path, options: Options) -> None:
+    (tmp_path / "tokens").mkdir()
+    tokens = write_tokens(tmp_path / "tokens", [f"run{number}" for number in range(12)])
+    train_lm([tokens], tmp_path / "here", options=options)
+    with dying(machines, after=5) as work:
+        train_lm([tokens], tmp_path / "there", options=options, work=work)
+    assert contents(tmp_path / "here") == contents(tmp_path / "there")
+
+
+def test_processes_of_this_machine_leave_nothing_behind_when_interrupted(images: Path, tmp_path: Path) -> None:
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    command = [sys.executable, "-m", "placerec", "describe", str(images), "-o", str(tmp_path / "d.npz")]
+    with subprocess.Popen(
+        [*command, "--cluster", "local:2", "--image-size", "1024"],
+        env={**ENVIRONMENT, "TMPDIR": str(scratch)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        # Two workers, and what Python has beside them.
+        _wait_until(lambda: len(_group(process.pid)) == 4, "the workers never began")
+        time.sleep(1)
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.stderr is not None
+        assert process.stderr.read() == "placerec: interrupted\n"
+    assert process.returncode == 1
+    _wait_until(lambda: not _group(process.pid), "a process is left")
+    assert not list(scratch.iterdir())
+    assert not (tmp_path / "d.npz").exists()
+
+
+def _wait_until(so: Callable[[], bool], complaint: str) -> None:
+    until = time.monotonic() + 60
+    while not so():
+        assert time.monotonic() < until, complaint
+        time.sleep(0.05)
+
+
+def _group(leader: int) -> list[int]:
+    """The processes of a process group."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, group = path.read_text().rpartition(")")[2].split()[:3]
+        except OSError:
+            continue
+        if int(group) == leader and state != "Z":
+            found.append(int(path.parent.name))
+    return found
+
+
+@pytest.mark.parametrize("address", ["", "local", "local:0", "127.0.0.1:8786", "tcp://host", "http://host:1"])
+def test_what_is_no_address_is_an_error_of_usage(address: str, tmp_path: Path) -> None:
+    with pytest.raises(JobError, match="is no cluster; give tcp://HOST:PORT of a scheduler, or local:N"):
+        check_address(address)
+    result = CliRunner().invoke(commands, ["describe", "x", "-o", str(tmp_path / "d.npz"), "--cluster", address])
+    assert (result.exit_code, "is no cluster; give tcp://" in result.stderr) == (2, True)
+
+
+def test_either_processes_here_or_a_cluster() -> None:
+    both = ["--jobs", "2", "--cluster", "local:2"]
+    result = CliRunner().invoke(commands, ["describe", "x", "-o", "d.npz", *both])
+    assert (result.exit_code, "leave one of them out" in result.stderr) == (2, True)
+
+
+def test_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "CONNECT", 0.5)
+    with (
+        pytest.raises(JobError, match=r"tcp://127\.0\.0\.1:9: no scheduler answers there"),
+        cluster("tcp://127.0.0.1:9"),
+    ):
+        pass
+
+
+def test_another_version(machines: Machines, monkeypatch: pytest.MonkeyPatch) -> None:
+    address = machines.have(1)
+    monkeypatch.setattr(room, "__version__", "99.0")
+    with pytest.raises(JobError, match=r"has placerec \d.*, and 99\.0 is wanted"), cluster(address):
+        pass
+    with pytest.raises(JobError, match=r"a worker has placerec 99\.0, and 1\.0 is wanted"):
+        room._known("1.0", room._Item(double))
+
+
+def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingExtraError, match="needs the package distributed"), cluster("local:1"):
+        pass
+
+
+def test_all_workers_and_the_scheduler_are_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "JOIN", 1.0)
+    with machines_in(tmp_path) as machines:
+        address = machines.have(1)
+        with cluster(address) as work:
+            items = [(str(tmp_path), number) for number in range(100)]
+            results = work(started, items)
+            next(results)
+            machines.kill()
+            with pytest.raises(JobError, match="no worker is left; start more with `dask worker tcp://"):
+                list(results)
+            results = work(started, items)
+            machines.scheduler.kill()
+            with pytest.raises(JobError, match="the scheduler is gone; start it again"):
+                list(results)
