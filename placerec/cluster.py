@@ -231,7 +231,7 @@ class _Dask:
     def _result(self, task: Task, future: Any) -> Any:
         """What a task gives; it is submitted again if what it needs was lost with a worker."""
         from distributed import KilledWorker
-        from distributed.comm import CommClosedError
+        from distributed.comm.core import CommClosedError
 
         for _ in range(LOSSES):
             try:
