@@ -5,6 +5,7 @@ kept for several functions lies with the workers, and is sent again if its worke
 """
 
 import logging
+import platform
 import re
 import signal
 import warnings
@@ -13,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from importlib import metadata
 from itertools import chain, count
 from multiprocessing import resource_tracker
 from tempfile import TemporaryDirectory
@@ -35,6 +37,7 @@ LOSSES = 5  # how often the same task may be lost
 KEPT = 16  # the most items that lie with a worker as one
 _LOCAL = re.compile(r"local:([1-9][0-9]*)")
 _REMOTE = re.compile(r"(tcp|tls)://\S+:[0-9]+")
+_SAME = "install the same everywhere"
 _TALKERS = ("asyncio", "bokeh", "distributed", "tornado")
 
 
@@ -141,14 +144,21 @@ def _check_workers(client: Any, address: str) -> None:
         client.wait_for_workers(1, timeout=JOIN)
     except TimeoutError as error:
         raise JobError(f"{address}: the scheduler has no workers; start some with `dask worker {address}`") from error
-    for worker, version in client.run(_version, on_error="return").items():
-        if version != __version__:
-            has = "cannot import placerec" if isinstance(version, Exception) else f"has placerec {version}"
-            raise JobError(f"{worker}: {has}, and {__version__} is wanted; install the same everywhere")
+    here, others = _versions(), {}
+    for worker, there in client.run(_versions, on_error="return").items():
+        if isinstance(there, Exception):
+            raise JobError(f"{worker}: cannot import placerec; install placerec {__version__} there") from there
+        if there["placerec"] != __version__:
+            raise JobError(f"{worker}: has placerec {there['placerec']}, and {__version__} is wanted; {_SAME}")
+        others.update({(name, there[name]): worker for name in here if there[name] != here[name]})
+    for (name, version), worker in others.items():
+        log.warning("%s: has %s %s, and here is %s; the bytes may differ", worker, name, version, here[name])
 
 
-def _version() -> str:
-    return __version__
+def _versions() -> dict[str, str]:
+    """What decides on the bytes."""
+    packages = {name: metadata.version(name) for name in ("numpy", "scipy")}
+    return {"placerec": __version__, **packages, "processor": platform.machine()}
 
 
 @dataclass(frozen=True)
@@ -158,19 +168,26 @@ class _Item(Generic[T]):
     item: T
 
 
-def _known(version: str, function: _Item[Callable[..., Any]]) -> Callable[..., Any]:
-    """On a worker: the function of a map."""
-    if version != __version__:
-        raise JobError(f"a worker has placerec {__version__}, and {version} is wanted; install the same everywhere")
-    return function.item
+@dataclass(frozen=True)
+class _Function:
+    """The function of a map, and the version of placerec that it is of."""
+
+    function: _Item[Callable[..., Any]]
+    version: str
+
+    def here(self) -> Callable[..., Any]:
+        """On a worker, perhaps one that came later than the map."""
+        if self.version != __version__:
+            raise JobError(f"a worker has placerec {__version__}, and {self.version} is wanted; {_SAME}")
+        return self.function.item
 
 
-def _one(function: Callable[[T], R], item: _Item[T], level: int) -> Noted[R]:
-    return noted(function, item.item, level)
+def _one(function: _Function, item: _Item[Any], level: int) -> Noted[Any]:
+    return noted(function.here(), item.item, level)
 
 
-def _several(function: Callable[[T], R], items: _Item[list[T]], level: int) -> list[Noted[R]]:
-    return [noted(function, item, level) for item in items.item]
+def _several(function: _Function, items: _Item[list[Any]], level: int) -> list[Noted[Any]]:
+    return [noted(function.here(), item, level) for item in items.item]
 
 
 class _Dask:
@@ -209,7 +226,7 @@ class _Dask:
         """What submits `call` of the function and something else; the function is with the scheduler."""
         # Under the function's name the scheduler remembers how long its tasks take.
         name = f"{getattr(getattr(function, 'func', function), '__name__', 'work').strip('_')}-{uuid4().hex}"
-        known = self._client.submit(_known, __version__, _Item(function), key=f"{name}-function")
+        known = self._client.submit(_Function, _Item(function), __version__, key=f"{name}-function")
         numbers, level = count(), log.getEffectiveLevel()
         return lambda item: self._client.submit(call, known, item, level, key=(name, next(numbers)))
 

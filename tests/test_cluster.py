@@ -253,13 +253,18 @@ def test_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
         pass
 
 
-def test_another_version(machines: Machines, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_version(machines: Machines, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     address = machines.have(1)
+    with monkeypatch.context() as patched, caplog.at_level(logging.WARNING, "placerec"):
+        patched.setattr("platform.machine", lambda: "abacus")
+        with cluster(address):
+            assert len(caplog.messages) == 1
+            assert "and here is abacus; the bytes may differ" in caplog.messages[0]
     monkeypatch.setattr(room, "__version__", "99.0")
     with pytest.raises(JobError, match=r"has placerec \d.*, and 99\.0 is wanted"), cluster(address):
         pass
     with pytest.raises(JobError, match=r"a worker has placerec 99\.0, and 1\.0 is wanted"):
-        room._known("1.0", room._Item(double))
+        room._one(room._Function(room._Item(double), "1.0"), room._Item(1), logging.INFO)
 
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -143,7 +143,7 @@ def arithmetic(rows: dict[str, Row], price: float, stored: float, listed: float)
         cells = f"{hours:.0f} | {hours / 1000:.2g} h | {price * hours:.0f} | {moved / 1e3:.2f} TB"
         print(f"| {title} | {cells} | {got.one / got.client:.0f} |")
     print(
-        f"\ntoken streams: {stored:.0f} bytes a frame; memory of the client for the list of frames: {listed:.0f} a frame"
+        f"\ntoken streams: {stored:.0f} bytes a frame; the list of frames in the client's memory: {listed:.0f} a frame"
     )
 
 
