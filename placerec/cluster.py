@@ -12,7 +12,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from importlib import metadata
 from itertools import chain, count
@@ -84,6 +84,8 @@ def _quiet() -> Iterator[Any]:
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", module=r"distributed|dask|tornado")
+            # Of a function with a large codebook, which is sent once.
+            warnings.filterwarnings("ignore", "Sending large graph")
             yield distributed
     finally:
         for logger, level in levels:
@@ -242,8 +244,9 @@ class _Dask:
             while waiting:
                 yield self._result(*waiting.popleft())
         finally:
-            if waiting:
-                self._client.cancel([future for _, future in waiting], force=True)
+            if waiting and self._client.status == "running":
+                with suppress(OSError):
+                    self._client.cancel([future for _, future in waiting], force=True)
 
     def _result(self, task: Task, future: Any) -> Any:
         """What a task gives; it is submitted again if what it needs was lost with a worker."""

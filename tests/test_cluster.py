@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -126,6 +127,8 @@ def test_results_and_notes_are_in_order_and_errors_come_through(
             assert list(work(double, range(40))) == list(range(0, 80, 2))
         assert caplog.messages == ["seven"]
         assert list(work(double, [])) == []
+        large = np.zeros(2_000_000)  # Dask would warn
+        assert list(work(partial(np.vdot, large), [large])) == [0.0]
         with pytest.raises(StreamError, match="3 cannot be used; take another"):
             list(work(refuse, [3, 4]))
         assert next(work(double, iter(range(10**9)))) == 0
@@ -168,7 +171,7 @@ def test_train_words(machines: Machines, images: Path, tmp_path: Path) -> None:
         assert contents(tmp_path / "here.npz") == contents(tmp_path / "there.npz")
 
 
-def test_tokenize(machines: Machines, images: Path, tmp_path: Path) -> None:
+def test_tokenize(machines: Machines, images: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = np.random.default_rng(0).normal(size=(60, SPEC.length)).astype(np.float32)
     Dictionary.fit(rows, spec=SPEC, size=4).save(tmp_path / "words.npz")
     tokenize([images], tmp_path / "words.npz", tmp_path / "here")
@@ -176,7 +179,8 @@ def test_tokenize(machines: Machines, images: Path, tmp_path: Path) -> None:
         tokenize([images], tmp_path / "words.npz", tmp_path / "there", work=work)
     assert contents(tmp_path / "here") == contents(tmp_path / "there")
     options = ["-w", str(tmp_path / "words.npz"), "-o", str(tmp_path / "command"), "--cluster", machines.have(1)]
-    result = CliRunner().invoke(commands, ["tokenize", str(images), *options])
+    monkeypatch.chdir(images)  # where the workers are not
+    result = CliRunner().invoke(commands, ["tokenize", "seq1", "seq2", "seq3", *options])
     assert result.exit_code == 0, result.output
     assert result.stderr.startswith("72 frames described, 0 skipped, 0 of one grey level throughout\n")
     assert contents(tmp_path / "here") == contents(tmp_path / "command")
