@@ -10,7 +10,7 @@ import re
 import signal
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from typing import Any, Generic, TypeVar
 from uuid import uuid4
 
 from placerec.errors import MissingExtraError
-from placerec.jobs import Each, Far, JobError, Noted, noted
+from placerec.jobs import Each, Far, JobError, Listed, Noted, noted
 from placerec.version import __version__
 
 T = TypeVar("T")
@@ -203,7 +203,7 @@ class _Dask:
         for answer in self._results(tasks):
             yield answer.told()
 
-    def keep(self, items: Sequence[T], /) -> Each[T]:
+    def keep(self, items: Listed[T], /) -> Each[T]:
         """Maps functions over items that lie with the workers; `items` gives them again when a worker is lost."""
         size = max(1, min(KEPT, len(items) // (4 * self._threads())))
         groups = [range(first, min(first + size, len(items))) for first in range(0, len(items), size)]

@@ -23,7 +23,7 @@ from placerec.evaluation import (
 )
 from placerec.evaluation.sheet import contact_sheet
 from placerec.evaluation.word_sheet import draw_word_sheet
-from placerec.evaluation.word_table import WordTable, typical_paths, word_sentences, word_table
+from placerec.evaluation.word_table import WordTable, typical_images, word_sentences, word_table
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import find_sequences
@@ -80,7 +80,7 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
                 best = beliefs if (smoothing, order) == ("witten-bell", 2) else best
         contact_sheet(_typical_frames(sequences), folder / "laboratory.png")
         words = word_table(_only(descriptors, ~training), dictionary)
-        draw_word_sheet(words, typical_paths(words, sequences), folder / "words.png", title="The words of run 3")
+        draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title="The words of run 3")
         plot_evaluation(best, evaluate(best), folder / "beliefs.png")
         write_text(
             folder / "report.html",

@@ -36,6 +36,14 @@ class Map(Protocol):
     def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]: ...
 
 
+class Listed(Protocol[T_co]):
+    """Items by number: a sequence, as far as a cluster needs it."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, at: int, /) -> T_co: ...
+
+
 class Each(Protocol[T_co]):
     """A map of one function after the other over the same items."""
 
@@ -46,7 +54,7 @@ class Each(Protocol[T_co]):
 class Far(Map, Protocol):
     """A map of workers on other machines (`cluster.cluster`), which can keep items for several functions."""
 
-    def keep(self, items: Sequence[T], /) -> Each[T]: ...
+    def keep(self, items: Listed[T], /) -> Each[T]: ...
 
 
 def far(work: Map | None) -> Map:
@@ -57,9 +65,11 @@ def far(work: Map | None) -> Map:
     return work if isinstance(work, Far) else map
 
 
-def each_of(items: Sequence[T], work: Map | None) -> Each[T]:
+def each_of(items: Listed[T], work: Map | None) -> Each[T]:
     """Maps functions over the items as `far` would; other machines are sent each item once, if there are two."""
-    return work.keep(items) if isinstance(work, Far) and len(items) > 1 else lambda function: map(function, items)
+    if isinstance(work, Far) and len(items) > 1:
+        return work.keep(items)
+    return lambda function: map(function, map(items.__getitem__, range(len(items))))
 
 
 def processors() -> int:

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from placerec import cluster as room
 from placerec.cli import commands
 from placerec.cluster import check_address, cluster
 from placerec.errors import MissingExtraError, StreamError
-from placerec.jobs import Each, Far, JobError, each_of
+from placerec.jobs import Each, Far, JobError, Listed, each_of
 from placerec.model import Options, train_lm
 from placerec.vision import DescriptorSpec, Dictionary, describe_sources, train_dictionary
 from placerec.words.tokenize import tokenize
@@ -50,7 +50,7 @@ class Dying:
     def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
         return self._counted(self._work(function, items))
 
-    def keep(self, items: Sequence[T], /) -> Each[T]:
+    def keep(self, items: Listed[T], /) -> Each[T]:
         each = self._work.keep(items)
         return lambda function: self._counted(each(function))
 

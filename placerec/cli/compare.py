@@ -51,8 +51,8 @@ def compare(
 ) -> None:
     """Run every method on the same test sequences.
 
-    TRAIN and SEQUENCE are labelled sequences of images, or folders of them. Each method learns from TRAIN; accuracy
-    with its interval, cost per frame, and for every two methods whether their difference holds.
+    TRAIN and SEQUENCE are labelled sequences (of images, videos, bags), or folders of them. Each method learns from
+    TRAIN; accuracy with its interval, cost per frame, and for every two methods whether their difference holds.
     """
     from placerec.evaluation.compare import check_methods
     from placerec.evaluation.compare import compare as run

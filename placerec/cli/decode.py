@@ -1,6 +1,8 @@
 """`placerec decode`."""
 
 import sys
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,6 +50,7 @@ METHODS = (
 @click.option("--calibrated", is_flag=True, help="Apply what `placerec calibrate` found to the beliefs.")
 @click.option("--unknown", is_flag=True, help="Add a column: the probability that the place is none of the model's.")
 @click.option("--explain", is_flag=True, help="Write NAME.explain.jsonl beside the beliefs: what decided each word.")
+@click.option("--live", is_flag=True, help="Answer each frame as it comes: a camera, or a video at its own pace.")
 @click.option(
     "--method",
     metavar="NAME",
@@ -68,10 +71,11 @@ METHODS = (
 )
 @talk_options
 def decode(
-    tokens: tuple[Path, ...],
+    tokens: tuple[Path | str, ...],
     model: Path,
     words: Path | None,
     reading: "Reading",
+    live: bool,
     method: str,
     scorer: str,
     as_json: bool,
@@ -80,31 +84,38 @@ def decode(
 ) -> None:
     """Find the belief over places for every frame.
 
-    TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, images. `-` reads one word a
-    line (or word, tab, seconds, tab, distance) and answers each at once.
+    TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, any SOURCE that tokenize takes:
+    folders of images, videos, bags, lists. `-` without -w reads one word a line (or word, tab, seconds, tab, distance)
+    and answers each at once. With -w and --live, TOKENS is a camera (camera:0, camera:/dev/video2,
+    camera:rtsp://...) or a video; frames that come too fast are dropped, and Ctrl-C ends it.
     """
-    from placerec.baselines import check_method, load_decoder
+    from placerec.baselines import check_method, load_decoder, make_decoder
     from placerec.baselines import decode as run
-    from placerec.model import decode_lines, format_beliefs
+    from placerec.model import decode_lines, decode_live, format_beliefs
 
     with usage("--method"):
         check_method(method, options, scorer=scorer)
-    if tokens == (Path("-"),):
-        if options.explain:
-            raise click.UsageError("`-` answers on stdout and writes no files: it takes no --explain")
-        if words or out:
-            raise click.UsageError("`-` reads words and answers on stdout: it takes neither -w nor -o")
+    if live:
+        if words is None or len(tokens) > 1 or Path("-") in tokens:
+            raise click.UsageError("--live follows one camera or video, and sees it through -w")
+        _check_answering("--live", out, options)
+        make = partial(make_decoder, method)
+        answers = decode_live(
+            tokens[0], model, words=words, reading=reading, options=options, scorer=scorer, as_json=as_json, make=make
+        )
+        with closing(answers):
+            for line in answers:
+                click.echo(line)
+        return
+    if tokens == (Path("-"),) and words is None:
+        _check_answering("`-`", out, options)
         if sys.stdin is None:
             raise click.UsageError("`-` reads standard input, and that is closed")
-        if options.looks_ahead:
-            raise click.UsageError(
-                "`-` answers each line before later words are known: it takes none of --smooth, --viterbi, --lag"
-            )
         recognizer = load_decoder(method, model, options=options, scorer=scorer)
         for line in decode_lines(recognizer, sys.stdin, as_json=as_json):
             click.echo(line)
         return
-    if Path("-") in tokens:
+    if Path("-") in tokens and words is None:
         raise click.UsageError("`-` cannot be mixed with files")
     if options.explain and out is None:
         raise click.UsageError("--explain writes files beside the beliefs: it needs -o")
@@ -123,3 +134,13 @@ def decode(
         )
     if out is None:
         click.echo(format_beliefs(beliefs[0], as_json=as_json), nl=False)
+
+
+def _check_answering(what: str, out: Path | None, options: "Decoding") -> None:
+    """Refuse what makes no sense where each frame is answered at once, on stdout."""
+    if out or options.explain:
+        raise click.UsageError(f"{what} answers on stdout and writes no files: it takes neither -o nor --explain")
+    if options.looks_ahead:
+        raise click.UsageError(
+            f"{what} answers each frame before later words are known: it takes none of --smooth, --viterbi, --lag"
+        )

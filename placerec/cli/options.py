@@ -31,6 +31,8 @@ class PathType(click.Path):
             self.fail("the path is empty", param, ctx)
         if str(value) == "-" and not self.allow_dash:
             self.fail("`-` is no stream here; name a path", param, ctx)
+        if str(value).startswith("camera:") and isinstance(param, click.Argument):
+            return value  # No path: one would lose a slash of the address.
         return super().convert(value, param, ctx)
 
 
@@ -123,7 +125,7 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
 def source_arguments(function: Command) -> Command:
     """SOURCE..., and how it is read. The command gets `sources` and `reading`."""
     function = reading_options()(function)
-    return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)(function)
+    return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH_OR_STREAM)(function)
 
 
 def jobs_option(function: Command) -> Command:
@@ -190,7 +192,7 @@ def work_options(function: Command) -> Command:
 
 
 def reading_options(note: str = "") -> Callable[[Command], Command]:
-    """--format: how sources are to be read. The command gets `reading`."""
+    """--format, --every, --topic, --labels: how sources are to be read. The command gets `reading`."""
 
     def decorated(function: Command) -> Command:
         @click.option(
@@ -201,11 +203,29 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
             show_default=True,
             help=f"What a folder of folders{note} is: sequences, or one folder per place.",
         )
+        @click.option(
+            "--every",
+            metavar="N",
+            type=click.IntRange(min=1),
+            default=1,
+            show_default=True,
+            help="Read the first of every N frames.",
+        )
+        @click.option("--topic", metavar="NAME", help="The images of a bag to read, if it has several topics of them.")
+        @click.option(
+            "--labels",
+            metavar="FILE",
+            type=PATH,
+            help="Lines 'start end place' in seconds that label a video or a bag; or a folder of NAME.labels.  "
+            "[default: NAME.labels beside it]",
+        )
         @functools.wraps(function)
-        def read(*args: Any, format_: str, **options: Any) -> Any:
+        def read(*args: Any, format_: str, every: int, topic: str | None, labels: Path | None, **options: Any) -> Any:
             from placerec.frames.reading import Reading
 
-            return function(*args, reading=Reading(format_), **options)
+            with usage("--labels"):
+                reading = Reading(format_, every, topic, labels)
+            return function(*args, reading=reading, **options)
 
         return read
 

@@ -1,10 +1,14 @@
 """SRILM's tools as commands: arguments go through untouched, for the tools have their own rules for options."""
 
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
 from placerec.srilm.run import TOOLS, run
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 _PURPOSES = {
     "ngram-count": "SRILM's tool: count n-grams, estimate models.",
@@ -39,6 +43,12 @@ class Tool(click.Command):
             ctx.exit()
         ctx.args = list(args)
         return ctx.args
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> "list[CompletionItem]":
+        """A file: to know the tool's options would be to import it."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
 
     def invoke(self, ctx: click.Context) -> None:
         """Run the tool and end with its exit status."""

@@ -37,8 +37,9 @@ def tokenize(
 ) -> None:
     """Write the visual word of every frame.
 
-    SOURCE is a sequence (a folder of images, with or without std_cam/ and localization/places.lst as in COLD), a
-    folder of sequences, or a folder with one folder of images per place.
+    SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
+    folder of images (any, or laid out as in COLD, KTH-IDOL2 or VPC), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
+    folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
     """
     from placerec.words.tokenize import tokenize as run
 

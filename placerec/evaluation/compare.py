@@ -26,7 +26,7 @@ from placerec.evaluation.panels import check_figure
 from placerec.files import held_folder, read_text, whole_folder, write_text
 from placerec.frames import Reading, find_sequences
 from placerec.frames import Sequence as FrameSequence
-from placerec.frames.naming import unique_names
+from placerec.frames.naming import own_name, unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
 from placerec.version import __version__
 
@@ -115,7 +115,10 @@ def _split(
     if not learning:
         raise EvaluationError("every sequence is a test sequence, and none is left to learn from; name others")
     both = [*learning, *testing]
-    names = unique_names([(s.source.resolve().name, s.source) for s in both], SourceError)
+    if reading.labels and reading.labels.is_file() and sum(sequence.recording is not None for sequence in both) > 1:
+        what = "is one file, and training and test are several recordings"
+        raise SourceError(f"{reading.labels}: {what}; name a folder that holds NAME.labels for each")
+    names = unique_names([(own_name(s.source.resolve()), s.source) for s in both], SourceError)
     both = [replace(sequence, name=name) for sequence, name in zip(both, names, strict=True)]
     training, tests = both[: len(learning)], both[len(learning) :]
     places = {frame.place for sequence in training for frame in sequence.frames} - {""}

@@ -1,6 +1,6 @@
 """One sheet of what a dictionary sees in an image: windows, orientation roses, and the nearest units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from placerec.evaluation.frame_view import FrameView, unit_note
 from placerec.evaluation.panels import figure_file
 from placerec.evaluation.summary import shorten
-from placerec.frames import read_gray
+from placerec.frames.sequence import Gray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,14 +28,13 @@ _BELOW = "Below: the nearest units, the word framed."
 _ROSE, _MARK = "#0072B2", "#D55E00"
 
 
-def draw_frame_sheet(view: FrameView, typical: Sequence[Path | None], path: Path | str) -> None:
-    """Draw a view as one picture, PNG, SVG or PDF by suffix; `typical`: each unit's typical frame, if it has one.
+def draw_frame_sheet(view: FrameView, typical: Mapping[int, Gray], path: Path | str) -> None:
+    """Draw a view as one picture, PNG, SVG or PDF by suffix; `typical`: the nearest units' typical frames, if any.
 
-    Raises OutputError for another suffix or a path that cannot be written, MissingExtraError without matplotlib,
-    SourceError for a typical frame that cannot be read.
+    Raises OutputError for another suffix or a path that cannot be written, MissingExtraError without matplotlib.
     """
-    pictures = {unit: read_gray(image) for unit in view.nearest if (image := typical[unit]) is not None}
-    aspect = next((picture.shape[0] / picture.shape[1] for picture in pictures.values()), 0.75)
+    pictures = [typical[unit] for unit in view.nearest if unit in typical]
+    aspect = next((picture.shape[0] / picture.shape[1] for picture in pictures), 0.75)
     second = _HEAD + _PANEL + 0.7
     height = second + _PANEL + 0.3
     with figure_file(path, _WIDTH, height) as figure:
@@ -65,7 +64,7 @@ def draw_frame_sheet(view: FrameView, typical: Sequence[Path | None], path: Path
         for rank, unit in enumerate(view.nearest):
             axes = panel(left + rank * (wide + 0.15), second, wide)
             axes.set_box_aspect(aspect)
-            _unit(axes, view, unit, pictures.get(unit))
+            _unit(axes, view, unit, typical.get(unit))
 
 
 def energies(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -10,9 +10,9 @@ from placerec.evaluation.frame_view import FrameView, view_frame
 from placerec.evaluation.panels import check_figure
 from placerec.evaluation.word_sheet import draw_word_sheet
 from placerec.evaluation.word_stability import plot_stability
-from placerec.evaluation.word_table import WordTable, typical_paths, word_table
+from placerec.evaluation.word_table import WordTable, typical_images, word_table
 from placerec.files import whole_file
-from placerec.frames import Reading, find_sequences
+from placerec.frames import Reading, Sequence, find_sequences
 from placerec.vision import Dictionary, describe
 from placerec.vision.stability import Stability, word_changes
 
@@ -36,9 +36,10 @@ def show_words(
     """
     dictionary = Dictionary.load(words)
     with _picture(out) as picture:
-        table, typical = _looked_up(sources, dictionary, reading, progress, matrix)
+        table, sequences = _looked_up(sources, dictionary, reading, progress, matrix)
         if picture is not None:
-            draw_word_sheet(table, typical, picture, title=f"The words of {Path(words).name}")
+            images = typical_images(table, sequences)
+            draw_word_sheet(table, images, picture, title=f"The words of {Path(words).name}")
     return table
 
 
@@ -59,11 +60,12 @@ def show_frame(
     dictionary = Dictionary.load(words)
     view = view_frame(image, dictionary)
     with _picture(out) as picture:
-        typical: list[Path | None] = [None] * len(view.words)
+        sequences: list[Sequence] = []
         if sources := list(sources):
-            table, typical = _looked_up(sources, dictionary, reading, progress)
+            table, sequences = _looked_up(sources, dictionary, reading, progress)
             view = replace(view, table=table)
         if picture is not None:
+            typical = {} if view.table is None else typical_images(view.table, sequences, view.nearest)
             draw_frame_sheet(view, typical, picture)
     return view
 
@@ -95,11 +97,10 @@ def _looked_up(
     reading: Reading,
     progress: Progress | None,
     matrix: Path | str | None = None,
-) -> tuple[WordTable, list[Path | None]]:
-    """The table of the sources' frames, and the image file of every unit's typical frame."""
+) -> tuple[WordTable, list[Sequence]]:
+    """The table of the sources' frames, and the sequences that these are of."""
     sequences = find_sequences(sources, reading=reading)
-    table = word_table(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary)
-    return table, typical_paths(table, sequences)
+    return word_table(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary), sequences
 
 
 @contextmanager

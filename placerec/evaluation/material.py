@@ -13,10 +13,11 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import EvaluationError
+from placerec.errors import EvaluationError, SourceError
 from placerec.files import read_text, write_text
 from placerec.frames import Sequence as FrameSequence
-from placerec.frames import read_gray
+from placerec.frames import files_of, images_at
+from placerec.frames.sequence import Gray
 from placerec.version import __version__
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe, descriptor, save_descriptors
 from placerec.vision.external import read_rows
@@ -106,8 +107,17 @@ def _described(
 
 def _content(sequence: FrameSequence, spec: DescriptorSpec) -> str:
     """A digest of a sequence's images; labels and times may change without them."""
-    images = [(f.name, hashlib.blake2b(f.path.read_bytes(), digest_size=16).hexdigest()) for f in sequence.frames]
-    return digest(sequence.name, images, spec.as_dict(), __version__)
+    names = [frame.name for frame in sequence.frames]
+    how = sequence.recording and repr(sequence.recording)
+    return digest(sequence.name, names, how, list(map(_hash, files_of(sequence))), spec.as_dict(), __version__)
+
+
+def _hash(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+    except OSError as error:
+        raise EvaluationError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _batches(missing: Sequence[tuple[FrameSequence, Path]]) -> Iterator[list[tuple[FrameSequence, Path]]]:
@@ -166,21 +176,28 @@ def _front(
     """What a frame costs up to its word, one at a time, as the mean over some images; reading them is not counted."""
     path = cache / f"front-{digest(dictionary.fingerprint, [s.name for s in sequences])}.json"
     if not path.exists():
-        images = [
-            frame.path
-            for sequence, one in zip(sequences, found, strict=True)
-            for frame in sequence.frames
-            if frame.name in one.frames
-        ]
-        chosen = [images[i] for i in np.unique(np.linspace(0, len(images) - 1, TIMED).astype(int))]
-        spent = np.zeros(2)
-        for image in chosen:
-            gray = read_gray(image)
+        spent, timed = np.zeros(2), 0
+        for gray in _spread_images(sequences, found):
             started = perf_counter()
             row = descriptor(gray, dictionary.spec)[None]
             described = perf_counter()
             dictionary.words(row)
             spent += described - started, perf_counter() - described
+            timed += 1
         names = ("descriptor", "word")
-        write_text(path, json.dumps(dict(zip(names, (1e6 * spent / len(chosen)).tolist(), strict=True))) + "\n")
+        write_text(path, json.dumps(dict(zip(names, (1e6 * spent / timed).tolist(), strict=True))) + "\n")
     return Front(**json.loads(read_text(path, EvaluationError)))
+
+
+def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descriptors]) -> Iterator[Gray]:
+    """Some images of those that have a descriptor, from all of the recordings."""
+    usable = []
+    for number, (sequence, one) in enumerate(zip(sequences, found, strict=True)):
+        names = set(one.frames)
+        usable += [(number, k) for k, frame in enumerate(sequence.frames) if frame.name in names]
+    chosen = [usable[i] for i in np.unique(np.linspace(0, len(usable) - 1, TIMED).astype(int))]
+    for number, sequence in enumerate(sequences):
+        for image in images_at(sequence, [k for its, k in chosen if its == number]):
+            if isinstance(image, str):
+                raise SourceError(image)
+            yield image

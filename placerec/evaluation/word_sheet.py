@@ -1,7 +1,7 @@
 """One sheet of all words: the typical frame of every unit on the lattice of the map, framed in its place's colour."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from placerec.evaluation.panels import figure_file, letter_colour, place_colours
 from placerec.evaluation.summary import shorten
 from placerec.evaluation.word_table import WordTable, word_sentences
-from placerec.frames import read_gray
+from placerec.frames.sequence import Gray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,13 +50,12 @@ class _Tiles:
         return self.inner * self.aspect + self.width * (2 * _FRAME + _BAR)
 
 
-def draw_word_sheet(table: WordTable, images: Sequence[Path | None], path: Path | str, *, title: str) -> None:
+def draw_word_sheet(table: WordTable, images: Mapping[int, Gray], path: Path | str, *, title: str) -> None:
     """Draw the words as one picture, PNG, SVG or PDF by suffix; `images`: each unit's typical frame, if it has one.
 
-    Raises OutputError for another suffix or a path that cannot be written, MissingExtraError without matplotlib,
-    SourceError for an image that cannot be read.
+    Raises OutputError for another suffix or a path that cannot be written, MissingExtraError without matplotlib.
     """
-    pictures = [None if image is None else read_gray(image) for image in images]
+    pictures = [images.get(unit) for unit in range(len(table.words))]
     shapes = [picture.shape for picture in pictures if picture is not None]
     aspect = float(np.clip(np.median([height / width for height, width in shapes]), 0.5, 1.5))
     # Big enough to be recognised, as long as the sheet can be opened at all.

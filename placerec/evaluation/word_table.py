@@ -2,14 +2,15 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.errors import SourceError
 from placerec.evaluation.metrics import codes
 from placerec.evaluation.summary import percent, shorten
-from placerec.frames import Sequence
+from placerec.frames import Sequence, images_at
+from placerec.frames.sequence import Gray
 from placerec.vision import Descriptors, Dictionary
 from placerec.vision.pca import project
 from placerec.vision.som import best_units
@@ -125,11 +126,27 @@ def word_table(descriptors: Descriptors, dictionary: Dictionary) -> WordTable:
     )
 
 
-def typical_paths(table: WordTable, sequences: Iterable[Sequence]) -> list[Path | None]:
-    """The image file of every unit's typical frame, None where it has none; `sequences` are those looked at."""
-    path = {(sequence.name, frame.name): frame.path for sequence in sequences for frame in sequence.frames}
-    chosen = table.typical.tolist()
-    return [None if i < 0 else path[table.sequence_names[i], table.frame_names[i]] for i in chosen]
+def typical_images(
+    table: WordTable, sequences: Iterable[Sequence], units: Iterable[int] | None = None
+) -> dict[int, Gray]:
+    """Unit -> grey levels of its typical frame, of those of `units` (None: all) that have one.
+
+    `sequences` are those looked at. Raises SourceError for an image that cannot be read any more.
+    """
+    wanted = range(len(table.words)) if units is None else units
+    unit_of = {
+        (table.sequence_names[frame], table.frame_names[frame]): unit
+        for unit in wanted
+        if (frame := int(table.typical[unit])) >= 0
+    }
+    found = {}
+    for sequence in sequences:
+        chosen = [k for k, frame in enumerate(sequence.frames) if (sequence.name, frame.name) in unit_of]
+        for k, image in zip(chosen, images_at(sequence, chosen), strict=True):
+            if isinstance(image, str):
+                raise SourceError(image)
+            found[unit_of[sequence.name, sequence.frames[k].name]] = image
+    return found
 
 
 def u_matrix(codebook: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from placerec.errors import ExperimentError, VisionError
 from placerec.evaluation.word_sheet import draw_word_sheet
-from placerec.evaluation.word_table import typical_paths, word_table
+from placerec.evaluation.word_table import typical_images, word_table
 from placerec.experiments import cache
 from placerec.frames import Sequence as FrameSequence
-from placerec.frames import find_sequences
+from placerec.frames import files_of, find_sequences
 from placerec.frames.folder import natural_key
+from placerec.frames.recordings import is_recording
 from placerec.jobs import Map, Progress
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe
 from placerec.vision.storage import read_npz, write_npz
@@ -58,10 +59,10 @@ def find_images(globs: Sequence[str], folder: Path) -> list[FrameSequence]:
     found: dict[str, None] = {}
     for pattern in globs:
         paths = sorted(glob.glob(str(folder / pattern)), key=natural_key)
-        folders = [path for path in paths if Path(path).is_dir()]
-        if not folders:
+        usable = [path for path in paths if Path(path).is_dir() or is_recording(Path(path))]
+        if not usable:
             raise ExperimentError(f"[data] sequences: {folder / pattern} is no folder; name folders of images")
-        found |= dict.fromkeys(folders)
+        found |= dict.fromkeys(usable)
     return find_sequences(found)
 
 
@@ -72,7 +73,8 @@ def describe_all(
     described = []
     total, done = sum(len(sequence.frames) for sequence in sequences), 0
     for sequence in sequences:
-        key = cache.key_of("descriptors", SPEC.as_dict(), [cache.content_of(frame.path) for frame in sequence.frames])
+        how = sequence.recording and repr(sequence.recording)
+        key = cache.key_of("descriptors", SPEC.as_dict(), how, list(map(cache.content_of, files_of(sequence))))
         one = Described(sequence, folder / f"{key}.npz")
         if not _usable(one):
             _describe(one, work, progress and _shifted(progress, done, total))
@@ -168,4 +170,4 @@ def draw_words(job: TokensJob, path: Path) -> None:
     sequences = [one.sequence for one in job.test]
     words = word_table(_joined([one.load() for one in job.test]), Dictionary.load(job.words))
     title = f"The words of S = {job.size}, seed {job.seed}, among the test frames"
-    draw_word_sheet(words, typical_paths(words, sequences), path, title=title)
+    draw_word_sheet(words, typical_images(words, sequences), path, title=title)

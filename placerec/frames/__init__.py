@@ -1,8 +1,9 @@
-"""Where images come from: folders are found, labelled and put in order; images are decoded one at a time."""
+"""Where images come from: folders, videos and bags are found, labelled and put in order; images are decoded singly."""
 
 from placerec.frames.find import find_sequences
 from placerec.frames.image import read_gray
+from placerec.frames.images import all_images, files_of, images_at
 from placerec.frames.reading import Reading
 from placerec.frames.sequence import Frame, Sequence
 
-__all__ = ["Frame", "Reading", "Sequence", "find_sequences", "read_gray"]
+__all__ = ["Frame", "Reading", "Sequence", "all_images", "files_of", "find_sequences", "images_at", "read_gray"]

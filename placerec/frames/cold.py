@@ -8,8 +8,8 @@ CAMERA = "std_cam"
 LIST = "places.lst"
 LIST_FOLDER = "localization"
 
-_FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_POSED = re.compile(rf"t({_FLOAT})_x({_FLOAT})_y({_FLOAT})_a({_FLOAT})\.[^.]+")
+FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_POSED = re.compile(rf"t({FLOAT})_x({FLOAT})_y({FLOAT})_a({FLOAT})\.[^.]+")
 # The point is asked for: a frame counter (t1.jpeg, t2.jpeg) is no clock.
 _POSELESS = re.compile(r"t(\d+\.\d+)\.[^.]+")
 

@@ -2,65 +2,124 @@
 
 import logging
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from placerec.errors import SourceError
-from placerec.frames.cold import CAMERA, LIST_FOLDER, find_list, parse_name
-from placerec.frames.folder import WANTED, list_folder, read_frames
-from placerec.frames.naming import unique_names
-from placerec.frames.places import PlaceList, check_place, check_twins, read_places
+from placerec.frames import idol, image_list, vpc
+from placerec.frames.bag import is_bag
+from placerec.frames.camera import find_camera
+from placerec.frames.cold import CAMERA, LIST_FOLDER, find_list
+from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames, stamp
+from placerec.frames.intervals import find_intervals
+from placerec.frames.naming import own_name, unique_names
+from placerec.frames.places import check_place, check_twins, read_places
 from placerec.frames.reading import Reading
+from placerec.frames.recordings import WANTED as RECORDED
+from placerec.frames.recordings import is_recording, read_recording
 from placerec.frames.sequence import Sequence
 
 log = logging.getLogger(__name__)
 
 # COLD needs four (COLD/lab/part/sequence); the limit keeps a mistyped source from walking a whole disk.
 MAX_DEPTH = 6
+STREAM = Path("-")
 
 
 @dataclass(frozen=True)
 class _Found:
-    """A sequence that is not read yet: `camera` is the folder of its images, `place` its label if it is one place."""
+    """A sequence that is not read yet: `folder` names it, and `camera` holds its frames.
+
+    `camera` is the folder of its images, or what is recorded in; `place` its label if it is one place.
+    """
 
     folder: Path
     camera: Path
-    images: tuple[str, ...]
+    images: tuple[str, ...] = ()
     places: Path | None = None
     place: str = ""
 
 
-def find_sequences(sources: Iterable[Path | str], *, reading: Reading = Reading()) -> list[Sequence]:
-    """The sequences in `sources`, in the order given, within a source in natural order; no image is opened.
+def find_sequences(
+    sources: Iterable[Path | str], *, reading: Reading = Reading(), endless: bool = False
+) -> list[Sequence]:
+    """The sequences in `sources`, in the order given, within a source in natural order; no image is decoded.
 
-    A source is a sequence (COLD's layout, its std_cam/, or a folder of images) or a folder of sequences, searched
-    downwards. Raises SourceError for sources without images, labels that cannot be used, a sequence given twice,
-    names that stay equal with the parent's name.
+    A source is a sequence (the layout of COLD, KTH-IDOL2 or VPC, or a folder of images; a video, a bag), a folder of
+    sequences, searched downwards, or `-`: a list of image files on standard input. `endless`: it may be a camera
+    (`find_camera`), whose frames are known as they come. Raises SourceError for sources without images, labels that
+    cannot be used, a sequence given twice, names that stay equal with the parent's name, and MissingExtraError for a
+    bag without rosbags.
     """
-    paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
+    sources = [sources] if isinstance(sources, str | Path) else list(sources)
+    if camera := find_camera(sources, endless):
+        return [camera]
+    paths = [Path(source) for source in sources]
     found = [item for path in paths for item in _in_source(path, reading.format)]
     _check_twice(found)
-    names = unique_names([(_absolute(item.folder).name, item.folder) for item in found], SourceError)
-    labels = [read_places(item.places, frozenset(item.images)) if item.places else None for item in found]
-    check_twins(_positions(found, labels))
-    return [
-        Sequence(name, read_frames(item.camera, item.images, labels=its, place=item.place), item.folder)
-        for name, item, its in zip(names, found, labels, strict=True)
-    ]
+    _tell_unused(found, reading)
+    own = [image_list.NAME if item.folder == STREAM else own_name(item.folder) for item in found]
+    names = unique_names([(name, item.folder) for name, item in zip(own, found, strict=True)], SourceError)
+    alone = sum(_is_recorded(item) for item in found) == 1
+    read = [_read(item, name, reading, alone=alone) for name, item in zip(names, found, strict=True)]
+    check_twins(chain.from_iterable(positions for _, positions in read))
+    return [sequence for sequence, _ in read]
+
+
+def _read(item: _Found, name: str, reading: Reading, *, alone: bool) -> tuple[Sequence, Iterable[tuple[str, str]]]:
+    """A sequence, and each of its places with the file and line, or the folder, that names it."""
+    if item.folder == STREAM:
+        frames, where = image_list.read_list()
+        return Sequence(name, frames[:: reading.every], item.folder), where
+    if _is_recorded(item):
+        intervals = find_intervals(item.camera, name, reading.labels, alone=alone)
+        frames, recording = read_recording(item.camera, intervals, reading)
+        return Sequence(name, frames, item.folder, recording), intervals.positions() if intervals else ()
+    labels = None
+    if item.places:
+        from_vpc = item.places.name == vpc.LIST
+        floor = _absolute(item.folder).name
+        labels = (
+            vpc.read_places(item.places, floor, item.images)
+            if from_vpc
+            else read_places(item.places, frozenset(item.images))
+        )
+    frames = read_frames(item.camera, item.images, labels=labels, place=item.place)[:: reading.every]
+    if labels:
+        return Sequence(name, frames, item.folder), labels.positions()
+    where = [(item.place, str(item.folder))] if item.place else [(f.place, str(f.path)) for f in frames if f.place]
+    return Sequence(name, frames, item.folder), where
+
+
+def _is_recorded(item: _Found) -> bool:
+    return not item.images and item.folder != STREAM
+
+
+def _tell_unused(found: list[_Found], reading: Reading) -> None:
+    if reading.labels and found and not any(map(_is_recorded, found)):
+        log.warning("%s: labels videos and bags, and no source is one; not read", reading.labels)
+    if reading.topic and found and not any(is_bag(item.camera) for item in found):
+        log.warning("topic %s: no source is a bag", reading.topic)
 
 
 def _in_source(source: Path, format: str) -> list[_Found]:
+    if source == STREAM:
+        return [_Found(source, source)]
     if not source.exists():
-        raise SourceError(f"{source}: no such folder")
+        raise SourceError(f"{source}: no such file or folder")
+    if is_recording(source):
+        return [_Found(source, source)]
     if not source.is_dir():
-        raise SourceError(f"{source}: is a file, and a folder is expected: a sequence or a folder of sequences")
+        raise SourceError(f"{source}: is a file of no kind that is read; name a folder of {WANTED}, or {RECORDED}")
     if format == "places":
         return _place_folders(source)
     found = [_camera(source.parent, source)] if _absolute(source).name == CAMERA else _below(source)
     found = _without_aliases(found)
     if not found:
-        raise SourceError(f"{source}: no sequence there; looked for {CAMERA}/ and {WANTED}, {MAX_DEPTH} folders deep")
+        wanted = f"{CAMERA}/, {WANTED}, {RECORDED}"
+        raise SourceError(f"{source}: no sequence there; looked for {wanted}, {MAX_DEPTH} folders deep")
     if format == "auto" and _looks_like_places(source, found):
         log.warning(
             "%s: read as one folder per place (%s); if they are sequences, say --format sequences",
@@ -79,18 +138,30 @@ def _below(folder: Path, depth: int = 0, seen: frozenset[str] = frozenset()) -> 
     listing = list_folder(folder)
     if CAMERA in listing.folders:
         return [_camera(folder, folder / CAMERA)]
-    places = find_list(folder)
+    if is_bag(folder):
+        return [_Found(folder, folder)]
+    places = find_list(folder) or vpc.find_list(folder)
     if places and not listing.images:
         log.warning("%s: no %s/ and no images beside it; not read", places, CAMERA)
-    itself = [_Found(folder, folder, listing.images, places)] if listing.images else []
-    if itself and (places or any(map(parse_name, listing.images))):
+    itself = [_Found(_owner(folder, listing.images), folder, listing.images, places)] if listing.images else []
+    if itself and (places or any(stamp(name) is not None for name in listing.images)):
+        if listing.recordings:
+            log.warning("%s: its images are read, and not %s beside them", folder, ", ".join(listing.recordings))
         return itself
-    inner = [folder / name for name in listing.folders if name != LIST_FOLDER]
-    below = [item for path in inner for item in _below(path, depth + 1, seen | {real})]
+    below = []
+    for name in sorted({*listing.folders, *listing.recordings} - {LIST_FOLDER}, key=natural_key):
+        path = folder / name
+        below += [_Found(path, path)] if name in listing.recordings else _below(path, depth + 1, seen | {real})
     if below and itself:
         # Maps and previews lie beside sequences more often than sequences hold folders of images.
-        log.warning("%s: its folders hold sequences; %d images beside them not read", folder, len(listing.images))
+        log.warning("%s: holds sequences; %d images beside them not read", folder, len(listing.images))
     return below or itself
+
+
+def _owner(folder: Path, images: tuple[str, ...]) -> Path:
+    """The folder that a sequence with images in `folder` is called after: in KTH-IDOL2 it holds png/."""
+    named = _absolute(folder).name == idol.CAMERA and all(map(idol.parse_name, images))
+    return _absolute(folder).parent if named else folder
 
 
 def _camera(folder: Path, camera: Path) -> _Found:
@@ -118,7 +189,8 @@ def _looks_like_places(source: Path, found: list[_Found]) -> bool:
         item.folder == item.camera != source == item.camera.parent
         and item.folder.name != name
         and item.places is None
-        and not any(map(parse_name, item.images))
+        and item.images
+        and all(stamp(name) is None for name in item.images)
         for item in found
     )
 
@@ -146,15 +218,6 @@ def _check_twice(found: list[_Found]) -> None:
         if first is not item.folder:
             also = "" if first == item.folder else f" (also as {first})"
             raise SourceError(f"{item.folder}: is given twice{also}; name each sequence once")
-
-
-def _positions(found: list[_Found], labels: list[PlaceList | None]) -> Iterator[tuple[str, str]]:
-    """Every place with the file and line, or the folder, that names it."""
-    for item, its in zip(found, labels, strict=True):
-        if item.place:
-            yield item.place, str(item.folder)
-        elif its:
-            yield from ((place, f"{its.path}:{its.lines[image]}") for image, place in its.places.items())
 
 
 def _absolute(path: Path) -> Path:

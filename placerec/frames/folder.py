@@ -9,21 +9,23 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from placerec.errors import SourceError
-from placerec.frames.cold import parse_name
+from placerec.frames import bag, cold, idol, video
 from placerec.frames.places import PlaceList
 from placerec.frames.sequence import Frame
 
 log = logging.getLogger(__name__)
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff", ".pgm", ".ppm")
+RECORDINGS = (*video.SUFFIXES, *bag.SUFFIXES)
 WANTED = "images (" + " ".join(f"*{suffix}" for suffix in SUFFIXES) + ")"
 
 
 @dataclass(frozen=True)
 class Listing:
-    """What lies directly in a folder: names of images (in no order), and folders in natural order."""
+    """What lies directly in a folder: names of images (in no order), of videos and bags (the same), and folders."""
 
     images: tuple[str, ...]
+    recordings: tuple[str, ...]
     folders: tuple[str, ...]
 
 
@@ -35,8 +37,11 @@ def natural_key(name: str) -> tuple[list[str | int], str]:
 
 
 def list_folder(folder: Path) -> Listing:
-    """The images and folders in `folder`, hidden ones left out; no image is opened. SourceError if unreadable."""
-    images, folders = [], []
+    """The images, recordings and folders in `folder`, hidden ones left out, nothing opened; SourceError if unreadable.
+
+    Folders are in natural order.
+    """
+    images, recordings, folders = [], [], []
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
@@ -46,9 +51,20 @@ def list_folder(folder: Path) -> Listing:
                     folders.append(entry.name)
                 elif entry.name.lower().endswith(SUFFIXES):
                     images.append(entry.name)
+                elif entry.name.lower().endswith(RECORDINGS):
+                    recordings.append(entry.name)
     except OSError as error:
         raise SourceError(f"{folder}: cannot be read: {error.strerror}") from error
-    return Listing(tuple(images), tuple(sorted(folders, key=natural_key)))
+    return Listing(tuple(images), tuple(recordings), tuple(sorted(folders, key=natural_key)))
+
+
+def stamp(name: str) -> float | None:
+    """The seconds in an image's name, if it is one of COLD or KTH-IDOL2."""
+    found = cold.parse_name(name)
+    if found is not None:
+        return found[0]
+    named = idol.parse_name(name)
+    return None if named is None else named.time
 
 
 def read_frames(
@@ -56,28 +72,30 @@ def read_frames(
 ) -> tuple[Frame, ...]:
     """The frames of `images` (file names in `folder`), in the order of their time stamps, else in natural order.
 
-    Labels come from `labels`; without it all are `place`. Raises SourceError where some names carry a time stamp and
-    others do not.
+    Labels come from `labels`; without it from the names (KTH-IDOL2), else all are `place`. Raises SourceError where
+    some names carry a time stamp and others do not.
     """
     times = _times(folder, images)
     timeless = any(map(math.isnan, times.values()))
     order = sorted(times, key=natural_key if timeless else lambda name: (times[name], name))
     if labels:
         _report(labels, times)
-    elif not place:
+        known = labels.places
+    else:
+        known = {name: named.place if (named := idol.parse_name(name)) else place for name in order}
+    if not labels and not any(known.values()):
         log.info("%s: no places.lst; its frames have no label", folder)
-    known = labels.places if labels else dict.fromkeys(order, place)
     return tuple(Frame(name, times[name], known.get(name, ""), folder / name) for name in order)
 
 
 def _times(folder: Path, images: Iterable[str]) -> dict[str, float]:
-    parsed = {name: parse_name(name) for name in images}
+    parsed = {name: stamp(name) for name in images}
     timeless = [name for name, found in parsed.items() if found is None]
     if 0 < len(timeless) < len(parsed):
         first = folder / min(timeless, key=natural_key)
         stamped = len(parsed) - len(timeless)
         raise SourceError(f"{first}: no time stamp in its name, and {stamped} images there have one; remove it")
-    return {name: math.nan if found is None else found[0] for name, found in parsed.items()}
+    return {name: math.nan if found is None else found for name, found in parsed.items()}
 
 
 def _report(labels: PlaceList, images: dict[str, float]) -> None:

@@ -1,4 +1,4 @@
-"""One image file -> grey levels. Damage is looked for before decoding: OpenCV gives half a picture and no error."""
+"""An encoded image -> grey levels. Damage is looked for before decoding: OpenCV gives half a picture and no error."""
 
 import re
 import struct
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
+from placerec.frames.sequence import Gray
 
 # cv2 is imported where it is used: listing frames must not cost its import.
 
@@ -25,14 +26,10 @@ _SCAN_END = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
 _DEPTHS = (8, 10, 12, 14, 16)
 
 
-def read_gray(path: Path) -> NDArray[np.uint8] | NDArray[np.float32]:
-    """The grey levels 0..255 of an image file, (h, w): uint8, or float32 for a file of 16 bits a channel.
+def read_gray(path: Path) -> Gray:
+    """The grey levels 0..255 of an image file, (h, w), as `decode_gray` gives them.
 
-    OpenCV's grey decoding is the one path (its luma differs by up to 11 levels from a conversion of the decoded
-    colours); alpha and colour profiles are ignored, EXIF orientation is applied. 16 bits: the depth in use is the
-    least of 8, 10, 12, 14, 16 bits that holds the brightest pixel, and its top becomes 255 (full 16 bits: value / 257).
-    Raises SourceError naming the file and the reason: missing, empty, truncated, damaged, no image, pixels of another
-    type, a side below 8 pixels.
+    Raises SourceError naming the file and the reason: missing, unreadable, and what `decode_gray` refuses.
     """
     path = Path(path)
     try:
@@ -41,35 +38,51 @@ def read_gray(path: Path) -> NDArray[np.uint8] | NDArray[np.float32]:
         raise SourceError(f"{path}: no such file") from error
     except OSError as error:
         raise SourceError(f"{path}: cannot be read: {error.strerror}") from error
+    return decode_gray(data, str(path))
+
+
+def decode_gray(data: bytes, name: str) -> Gray:
+    """The grey levels 0..255 of an encoded image (JPEG, PNG...), (h, w): uint8, or float32 for 16 bits a channel.
+
+    OpenCV's grey decoding is the one path (its luma differs by up to 11 levels from a conversion of the decoded
+    colours); alpha and colour profiles are ignored, EXIF orientation is applied. 16 bits: the depth in use is the
+    least of 8, 10, 12, 14, 16 bits that holds the brightest pixel, and its top becomes 255 (full 16 bits: value / 257).
+    Raises SourceError that begins with `name`: empty, truncated, damaged, no image, pixels of another type, a side
+    below 8 pixels.
+    """
     if not data:
-        raise SourceError(f"{path}: is empty; {_REMEDY}")
+        raise SourceError(f"{name}: is empty; {_REMEDY}")
     if data.startswith(_JPEG):
-        _check_jpeg(path, data)
+        _check_jpeg(name, data)
     elif data.startswith(_PNG):
-        data = _plain_png(path, data)
-    pixels = _decode(path, data)
+        data = _plain_png(name, data)
+    return as_gray(_decode(name, data), name)
+
+
+def as_gray(pixels: NDArray[Any], name: str) -> Gray:
+    """Decoded grey levels (h, w) as 0..255; SourceError for a side below 8 pixels, or not 8 or 16 bits."""
     height, width = pixels.shape[:2]
     if min(height, width) < MIN_SIDE:
-        raise SourceError(f"{path}: is {width}x{height} pixels, and {MIN_SIDE} a side are needed; remove it")
+        raise SourceError(f"{name}: is {width}x{height} pixels, and {MIN_SIDE} a side are needed; remove it")
     if pixels.dtype == np.uint16:
         return _stretch(pixels)
     if pixels.dtype != np.uint8:
-        raise SourceError(f"{path}: has pixels of type {pixels.dtype}; save it with 8 or 16 bits a channel")
+        raise SourceError(f"{name}: has pixels of type {pixels.dtype}; save it with 8 or 16 bits a channel")
     return pixels
 
 
-def _decode(path: Path, data: bytes) -> NDArray[Any]:
+def _decode(name: str, data: bytes) -> NDArray[Any]:
     import cv2
 
     # ANYDEPTH: without it 16 bits are cut to the upper 8, which leaves 12-bit cameras a black picture.
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
     try:
-        with _quiet():
+        with quiet():
             pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error as error:
-        raise SourceError(f"{path}: OpenCV refuses it ({' '.join(error.err.split())}); {_REMEDY}") from error
+        raise SourceError(f"{name}: OpenCV refuses it ({' '.join(error.err.split())}); {_REMEDY}") from error
     if pixels is None:
-        raise SourceError(f"{path}: is no image that OpenCV can decode; {_REMEDY}")
+        raise SourceError(f"{name}: is no image that OpenCV can decode; {_REMEDY}")
     return pixels
 
 
@@ -79,7 +92,7 @@ def _stretch(pixels: NDArray[np.uint16]) -> NDArray[np.float32]:
     return pixels * np.float32(255 / ((1 << depth) - 1))
 
 
-def _check_jpeg(path: Path, data: bytes) -> None:
+def _check_jpeg(name: str, data: bytes) -> None:
     """Raise SourceError if the end marker cannot be reached; what follows it (padding, a picture) is no concern.
 
     The segments are walked, for a thumbnail within one has an end marker of its own.
@@ -97,10 +110,10 @@ def _check_jpeg(path: Path, data: bytes) -> None:
             end = _SCAN_END.search(data, place)
             place = end.start() if end else len(data)
     if data[place : place + 2] != b"\xff\xd9":
-        raise SourceError(f"{path}: JPEG is truncated or damaged (no end marker); {_REMEDY}")
+        raise SourceError(f"{name}: JPEG is truncated or damaged (no end marker); {_REMEDY}")
 
 
-def _plain_png(path: Path, data: bytes) -> bytes:
+def _plain_png(name: str, data: bytes) -> bytes:
     """The same picture without colour profile and comments; SourceError if it is truncated or a checksum is wrong.
 
     With a gamma or sRGB tag libpng weighs the colours otherwise (up to 65 grey levels), and it writes to stderr about
@@ -115,12 +128,12 @@ def _plain_png(path: Path, data: bytes) -> bytes:
             break
         if kind == b"eXIf" or not kind[0] & 0x20:
             if zlib.crc32(data[place + 4 : end - 4]) != int.from_bytes(data[end - 4 : end], "big"):
-                raise SourceError(f"{path}: PNG is damaged (checksum of {kind.decode('latin-1')}); {_REMEDY}")
+                raise SourceError(f"{name}: PNG is damaged (checksum of {kind.decode('latin-1')}); {_REMEDY}")
             kept.append(data[place:end])
         if kind == b"IEND":
             return b"".join(kept)
         place = end
-    raise SourceError(f"{path}: PNG is truncated (no IEND); {_REMEDY}")
+    raise SourceError(f"{name}: PNG is truncated (no IEND); {_REMEDY}")
 
 
 _lock = threading.Lock()
@@ -129,7 +142,7 @@ _level = 0
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """OpenCV's log is silent within: the error that is raised says what it would say, and names the file.
 
     The level is one for the process: the first thread to enter keeps it, the last to leave restores it.

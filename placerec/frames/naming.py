@@ -6,6 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from placerec.errors import PlacerecError
+from placerec.frames import vpc
+
+
+def own_name(source: Path) -> str:
+    """What the sequence in this folder or file is called: as it is, without suffix; a floor of VPC as HOME-FLOOR."""
+    # Not resolve(): a link keeps the name that the user gave it.
+    path = Path(os.path.abspath(source))
+    if path.is_file():
+        return path.stem
+    return f"{path.parent.name}-{path.name}" if vpc.find_list(path) else path.name
 
 
 def unique_names(named: Sequence[tuple[str, Path]], error: type[PlacerecError]) -> list[str]:

@@ -5,7 +5,7 @@ UTF-8 with or without a byte order mark; LF or CRLF; lines in any order; blank l
 """
 
 import unicodedata
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,11 +18,15 @@ COLUMNS = frozenset({"frame", "time", "place", "word", "distance", "selected", "
 
 @dataclass(frozen=True)
 class PlaceList:
-    """A places.lst: image name -> place, and image name -> the line (from 1) that says so."""
+    """The labels of images: image name -> place, and image name -> the line (from 1) that says so."""
 
     path: Path
     places: dict[str, str]
     lines: dict[str, int]
+
+    def positions(self) -> Iterator[tuple[str, str]]:
+        """Every place, and the file and line that name it."""
+        return ((place, f"{self.path}:{self.lines[image]}") for image, place in self.places.items())
 
 
 def check_place(name: str) -> str | None:

@@ -60,6 +60,6 @@ def _kenlm() -> Any:
         import kenlm
     except ImportError as error:
         raise MissingExtraError(
-            "kenlm", "scoring with KenLM", "pip install kenlm (it is compiled; not on Windows)"
+            "kenlm", "scoring with KenLM", "pip install kenlm (it is compiled; not on Windows, nor on Python 3.13)"
         ) from error
     return kenlm

@@ -13,6 +13,7 @@ from placerec.files import held_folder, write_text
 from placerec.hohmm import Beliefs
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.unknown import measure_distances
+from placerec.model.corpus import TokenMaker, dictionary_of, stream_files
 from placerec.model.decoding import PAPER, Decoding, describe_decoding
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.recognize import make_recognizer, token_streams
@@ -34,7 +35,7 @@ def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decod
     with held_folder(path) if path.is_dir() else nullcontext():
         models = load_model(path)
         streams = token_streams(tokens, models)
-        _refuse_training(models, streams)
+        _refuse_training(models, dictionary_of(stream_files(tokens)), streams)
         calibration = fit_calibration(*_judged(models, _decoded(models, streams, options)))
         found = {
             **calibration.to_json(),
@@ -48,12 +49,14 @@ def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decod
     return calibration
 
 
-def _refuse_training(models: PlaceModels, streams: Sequence[WordStream]) -> None:
+def _refuse_training(models: PlaceModels, maker: TokenMaker | None, streams: Sequence[WordStream]) -> None:
     trained = {item["name"] if isinstance(item, Mapping) else item for item in models.description.get("sequences", ())}
+    seen = maker.trained_on if maker else frozenset()
     for stream in streams:
-        if stream.name in trained:
+        if stream.name in trained or stream.name in seen:
+            what = "models" if stream.name in trained else "words"
             raise ModelError(
-                f"{stream.name}: trained {models.path}, which is surer of it than of anything new; "
+                f"{stream.name}: trained the {what} of {models.path}, which is surer of it than of anything new; "
                 "calibrate on labelled sequences that trained neither the words nor the models"
             )
 

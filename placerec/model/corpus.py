@@ -28,10 +28,11 @@ VOCABULARY = "vocab.txt"
 
 @dataclass(frozen=True)
 class TokenMaker:
-    """The dictionary that made token streams, and a folder of them that says so."""
+    """The dictionary that made token streams, the sequences that it was learnt from, and a folder that says so."""
 
     folder: Path
     fingerprint: str
+    trained_on: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,7 @@ def _maker(folder: Path) -> TokenMaker | None:
     if not path.exists():
         return None
     try:
-        fingerprint = json.loads(read_text(path, StreamError))["dictionary"]
-    except (ValueError, KeyError, TypeError) as error:
+        found = json.loads(read_text(path, StreamError))
+        return TokenMaker(folder, str(found["dictionary"]), frozenset(map(str, found.get("trained_on", ()))))
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StreamError(f"{path}: is no description of tokens; tokenize again") from error
-    return TokenMaker(folder, str(fingerprint))

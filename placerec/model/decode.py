@@ -121,7 +121,7 @@ def _spare_sources(sources: Sequence[Path | str], out: Path) -> None:
 def format_beliefs(beliefs: Beliefs, *, as_json: bool = False) -> str:
     """The text of a beliefs file: TSV with a header, or one JSON object a line."""
     lines = [] if as_json else [format_header(beliefs.places, unknown=beliefs.unknown is not None)]
-    lines += [_line(beliefs.places, *row, as_json=as_json) for row in belief_rows(beliefs)]
+    lines += [format_line(beliefs.places, *row, as_json=as_json) for row in belief_rows(beliefs)]
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -146,7 +146,7 @@ def decode_lines(recognizer: Decoder, lines: Iterable[str], *, as_json: bool = F
         except ModelError as error:
             raise StreamError(at("<stdin>", frame + 1, str(error))) from error
         row = str(frame), time, "", word, belief.selected, belief.best, belief.probability.tolist(), belief.unknown
-        yield _line(recognizer.places, *row, as_json=as_json)
+        yield format_line(recognizer.places, *row, as_json=as_json)
     if strange:
         log.warning("<stdin>: lines skipped because the models do not list their word: %d", strange)
     if recognizer.unexplained:
@@ -177,7 +177,7 @@ def _number(text: str, frame: int, complaint: str) -> float:
     return value
 
 
-def _line(
+def format_line(
     places: Sequence[str],
     frame: str,
     time: float,
@@ -190,6 +190,7 @@ def _line(
     *,
     as_json: bool,
 ) -> str:
+    """One frame's line of a beliefs file, without its line end."""
     if not as_json:
         return format_row(frame, time, truth, word, selected, best, belief, unknown)
     return json.dumps(

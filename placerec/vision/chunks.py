@@ -1,9 +1,9 @@
 """Matrices that come in pieces: what is computed from them does not depend on how they were cut."""
 
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import IO, overload
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ def chunks(source: Source) -> Iterator[Rows]:
         yield np.concatenate(waiting)
 
 
-class Stored(Sequence[Rows]):
+class Stored:
     """The chunks of a source, kept for any number of passes; as a stream, too.
 
     `each` maps functions over them; workers on other machines have copies of their own.
@@ -57,23 +57,13 @@ class Stored(Sequence[Rows]):
     def __len__(self) -> int:
         return self._count
 
-    @overload
-    def __getitem__(self, at: int) -> Rows: ...
-
-    @overload
-    def __getitem__(self, at: slice) -> list[Rows]: ...
-
-    def __getitem__(self, at: int | slice) -> Rows | list[Rows]:
-        if isinstance(at, slice):
-            return [self[i] for i in range(*at.indices(self._count))]
-        if not 0 <= at < self._count:
-            raise IndexError(at)
+    def __getitem__(self, at: int) -> Rows:
         size = 4 * self._width * CHUNK
         self._file.seek(at * size)
         return np.frombuffer(self._file.read(size), np.float32).reshape(-1, self._width)
 
     def __call__(self) -> Iterator[Rows]:
-        return iter(self)
+        return map(self.__getitem__, range(len(self)))
 
 
 @contextmanager

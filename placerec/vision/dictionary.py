@@ -85,7 +85,10 @@ class Quality:
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """PCA + map: codebook float32 (K, k) and hits int64 (K,), the training frames per unit, row-major on the map."""
+    """PCA + map: codebook float32 (K, k) and hits int64 (K,), the training frames per unit, row-major on the map.
+
+    `sequences`: the names of the recordings that it was learnt from, as far as they are known.
+    """
 
     spec: DescriptorSpec
     pca: Pca
@@ -93,6 +96,7 @@ class Dictionary:
     hits: NDArray[np.int64]
     training: Training
     quality: Quality
+    sequences: tuple[str, ...] = ()
 
     @classmethod
     def fit(
@@ -221,6 +225,7 @@ class Dictionary:
             "descriptor": self.spec.as_dict(),
             "training": asdict(self.training),
             "quality": asdict(self.quality),
+            "sequences": list(self.sequences),
         }
 
 
@@ -276,13 +281,14 @@ def _restored(arrays: Arrays, meta: dict[str, Any]) -> Dictionary:
     try:
         spec, training = DescriptorSpec(**meta["descriptor"]), Training(**meta["training"])
         quality = Quality(**meta["quality"])
+        sequences = tuple(map(str, meta.get("sequences", ())))
     except (KeyError, TypeError) as error:
         raise VisionError(f"its meta is incomplete ({error})") from error
     if not all(isinstance(value, int | float) for value in asdict(quality).values()):
         raise VisionError("its meta holds a quality that is not a number")
     _check_arrays(arrays, {"d": spec.length, "k": arrays["variances"].size, "K": training.size**2})
     pca = Pca(arrays["mean"], arrays["components"], arrays["variances"], quality.explained, quality.needed)
-    return Dictionary(spec, pca, arrays["codebook"], arrays["hits"], training, quality)
+    return Dictionary(spec, pca, arrays["codebook"], arrays["hits"], training, quality, sequences)
 
 
 def _check_arrays(arrays: Arrays, lengths: dict[str, int]) -> None:

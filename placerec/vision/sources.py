@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -96,6 +97,7 @@ def train_dictionary(
             width=width,
             work=work,
         )
+        dictionary = replace(dictionary, sequences=tuple(sequence.name for sequence in training))
         dictionary.save(unfinished)
         _report(dictionary)
         if others:

@@ -4,14 +4,15 @@ import logging
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import Any, cast
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import SourceError, VisionError
-from placerec.frames import Frame, Sequence, read_gray
+from placerec.errors import VisionError
+from placerec.frames import Frame, Sequence, all_images
 from placerec.frames.sequence import Gray
 from placerec.jobs import Progress
 from placerec.vision.dictionary import Dictionary
@@ -81,22 +82,22 @@ def word_changes(
     """
     check_describes_images(dictionary.spec)
     sequences = list(sequences)
-    frames = [frame for sequence in sequences for frame in sequence.frames]
+    total = sum(len(sequence.frames) for sequence in sequences)
     words: list[Words] = []
     kept: list[int] = []
-    for first in range(0, len(frames), _CHUNK):
-        rows = []
-        for number, frame in enumerate(frames[first : first + _CHUNK], start=first):
-            described = _described(frame, dictionary.spec, np.random.Generator(np.random.PCG64([seed, number])))
-            if described is not None:
-                rows.append(described)
-                kept.append(number)
-            if progress is not None:
-                progress(number + 1, len(frames))
-        if rows:
+    rows: list[NDArray[np.float32]] = []
+    for number, (frame, image) in enumerate(chain.from_iterable(map(all_images, sequences))):
+        described = _described(frame, image, dictionary.spec, np.random.Generator(np.random.PCG64([seed, number])))
+        if described is not None:
+            rows.append(described)
+            kept.append(number)
+        if rows and (len(rows) == _CHUNK or number == total - 1):
             words.append(dictionary.words(np.concatenate(rows))[0].reshape(len(rows), -1))
+            rows = []
+        if progress is not None:
+            progress(number + 1, total)
     if not kept:
-        raise VisionError(f"none of the {len(frames)} images can be read; name a folder with images")
+        raise VisionError(f"none of the {total} images can be read; name a folder with images")
     starts = np.cumsum([len(sequence.frames) for sequence in sequences])
     sequence_of = np.searchsorted(starts, kept, side="right")
     return _compared(np.concatenate(words), sequence_of[1:] == sequence_of[:-1], dictionary.training.size)
@@ -121,15 +122,17 @@ def _shares(changed: int, neighbour: int, of: int) -> dict[str, float | None]:
     return {"changed": changed / of if of else None, "to_neighbour": neighbour / of if of else None}
 
 
-def _described(frame: Frame, spec: DescriptorSpec, rng: np.random.Generator) -> NDArray[np.float32] | None:
+def _described(
+    frame: Frame, gray: Gray | str, spec: DescriptorSpec, rng: np.random.Generator
+) -> NDArray[np.float32] | None:
     """Descriptors of a frame as it is and after each change, (1 + changes, d); None if it cannot be used."""
+    if isinstance(gray, str):
+        log.warning("%s; the frame is skipped", gray)
+        return None
     try:
-        gray = read_gray(frame.path)
         return np.stack([descriptor(gray, spec), *(descriptor(each, spec) for each in _changed(gray, spec, rng))])
-    except SourceError as error:
-        log.warning("%s; the frame is skipped", error)
     except VisionError as error:
-        log.warning("%s: %s; the frame is skipped", frame.path, error)
+        log.warning("%s: frame %s: %s; the frame is skipped", frame.path, frame.name, error)
     return None
 
 

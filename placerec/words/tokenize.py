@@ -39,7 +39,7 @@ def tokenize(
     `words`: the words.npz to use. `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed
     elsewhere (`describe`). `work`: who does the work (`jobs.workers`), None for threads; the bytes are the same with
     any. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes on from
-    there. tokens.json names the dictionary's fingerprint, so that models know what they were trained on.
+    there. tokens.json names the dictionary's fingerprint and what it was learnt from, for who trains and calibrates.
     """
     dictionary = Dictionary.load(Path(words))
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
@@ -110,7 +110,7 @@ def _parts(
     progress: Progress | None,
 ) -> Iterator[WordStream]:
     """Pieces of the token streams, those of a sequence one after the other."""
-    sequences = find_sequences(sources, reading=reading)
+    sequences = find_sequences(sources, reading=reading, endless=True)
     names = set()
     if matrix is not None:
         parts = iter(tokens_of(describe(sequences, dictionary.spec, matrix=matrix), dictionary))
@@ -170,6 +170,11 @@ def _write(parts: Iterable[WordStream], dictionary: Dictionary, folder: Path) ->
         names.add(part.name)
         seen.update(part.words)
     write_vocabulary(dictionary.vocabulary, folder / "vocab.txt")
-    description = {"format": "placerec tokens 1", "version": __version__, "dictionary": dictionary.fingerprint}
+    description = {
+        "format": "placerec tokens 1",
+        "version": __version__,
+        "dictionary": dictionary.fingerprint,
+        "trained_on": list(dictionary.sequences),
+    }
     write_text(folder / "tokens.json", json.dumps(description, indent=2) + "\n")
     return names, seen

@@ -148,7 +148,7 @@ def test_bad_values_are_errors_of_usage(world: Path, command: str, option: str, 
 def test_empty_paths_and_dashes_are_refused_where_nothing_is_streamed(world: Path) -> None:
     misused("Invalid value for '-o' / '--out': the path is empty", "train-lm", world / "tokens", "-o", "")
     misused("Invalid value for 'SOURCE...': the path is empty", "train-words", "", "-o", world / "no")
-    misused("`-` is no stream here; name a path", "train-words", "-", "-o", world / "no")
+    misused("`-` is no stream here; name a path", "train-lm", "-", "-o", world / "no")
     misused("`-` is no stream here; name a path", "describe", world / "runs", "-o", "-")
 
 
@@ -316,8 +316,7 @@ def test_decode_streams(world: Path) -> None:
         "warning: <stdin>: lines skipped because the models do not list their word: 2",
     ]
     assert done("decode", "-", *model, stdin="").stdout.count("\n") == 1
-    misused("it takes neither -w nor -o", "decode", "-", *model, "-o", world / "no")
-    misused("it takes neither -w nor -o", "decode", "-", *model, "-w", world / "words.npz")
+    misused("it takes neither -o nor --explain", "decode", "-", *model, "-o", world / "no")
     misused("`-` cannot be mixed with files", "decode", "-", world / "tokens", *model)
 
 

@@ -60,7 +60,7 @@ def test_misuse(args: tuple[str, ...], message: str, world: Path) -> None:
 def test_a_stream_cannot_look_ahead(args: tuple[str, ...], world: Path) -> None:
     result = decode("-", "-m", world / "model", *args, stdin="w01\n")
     assert (result.exit_code, result.stdout) == (2, "")
-    assert "`-` answers each line before later words are known" in result.stderr
+    assert "`-` answers each frame before later words are known" in result.stderr
 
 
 def test_options_change_the_answer(world: Path) -> None:
@@ -120,7 +120,7 @@ def test_decisions_are_written_and_read(world: Path, tmp_path: Path) -> None:
     for misuse, message in (
         (args, "--explain writes files beside the beliefs: it needs -o"),
         ((*args, "-o", tmp_path / "b", "--smooth"), "explain tells how the filter decides word by word: it takes none"),
-        (("-", *args[1:]), "`-` answers on stdout and writes no files: it takes no --explain"),
+        (("-", *args[1:]), "`-` answers on stdout and writes no files: it takes neither -o nor --explain"),
     ):
         refused = decode(*misuse)
         assert (refused.exit_code, refused.stdout) == (2, "")

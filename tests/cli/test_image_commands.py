@@ -26,11 +26,9 @@ def test_sources_without_images_are_named(world: Path, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "file.txt").write_text("")
     for args in (["train-words"], ["describe"], ["tokenize", "-w", world / "words.npz"]):
-        fails("nowhere: no such folder", *args, tmp_path / "nowhere", "-o", tmp_path / "no")
-        fails(
-            "empty: no sequence there; looked for std_cam/ and images", *args, tmp_path / "empty", "-o", tmp_path / "n"
-        )
-        fails(r"file\.txt: is a file, and a folder is expected", *args, tmp_path / "file.txt", "-o", tmp_path / "no")
+        fails("nowhere: no such file or folder", *args, tmp_path / "nowhere", "-o", tmp_path / "no")
+        fails("empty: no sequence there; looked for std_cam/, images", *args, tmp_path / "empty", "-o", tmp_path / "n")
+        fails(r"file\.txt: is a file of no kind that is read", *args, tmp_path / "file.txt", "-o", tmp_path / "no")
 
 
 def test_images_that_cannot_be_read_are_named_and_counted(world: Path, tmp_path: Path) -> None:

@@ -15,6 +15,8 @@ from placerec.evaluation.look import show_frame, show_words, stability
 from placerec.evaluation.word_sheet import draw_word_sheet
 from placerec.evaluation.word_stability import format_stability, plot_stability
 from placerec.evaluation.word_table import WordTable
+from placerec.frames import read_gray
+from placerec.frames.sequence import Gray
 from placerec.vision import DescriptorSpec, train_dictionary
 from placerec.vision.stability import ChangeResult, Stability
 
@@ -64,9 +66,13 @@ def table(size: int, places: tuple[str, ...], seed: int = 0) -> WordTable:
     )
 
 
+def typical(world: Path, words: WordTable) -> dict[int, Gray]:
+    image = read_gray(min((world / "seq1/std_cam").iterdir()))
+    return {unit: image for unit, frame in enumerate(words.typical) if frame >= 0}
+
+
 def draw(world: Path, words: WordTable, path: Path) -> list[str]:
-    image = min((world / "seq1/std_cam").iterdir())
-    draw_word_sheet(words, [None if i < 0 else image for i in words.typical], path, title="Words")
+    draw_word_sheet(words, typical(world, words), path, title="Words")
     return drawn_text(path)
 
 
@@ -128,10 +134,8 @@ def test_long_names_of_many_places_are_shortened_and_nothing_leaves_the_sheet(
 
     monkeypatch.setattr(Figure, "savefig", look_over)
     places = tuple(f"the_long_corridor_of_the_building_on_floor_{i:02d}" for i in range(30))
-    image = min((world / "seq1/std_cam").iterdir())
     words = table(size, places)
-    paths = [None if i < 0 else image for i in words.typical]
-    draw_word_sheet(words, paths, tmp_path / "a.png", title=f"The words of {'x' * 300}.npz")
+    draw_word_sheet(words, typical(world, words), tmp_path / "a.png", title=f"The words of {'x' * 300}.npz")
     assert sum("…" in text for text in inside) == 31
     assert [text for text, within in inside.items() if not within] == []
 

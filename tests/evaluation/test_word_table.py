@@ -5,14 +5,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from placerec.evaluation.word_table import WordTable, format_words, typical_paths, u_matrix, word_table
-from placerec.frames import Frame, Sequence
+from placerec.errors import SourceError
+from placerec.evaluation.word_table import WordTable, format_words, typical_images, u_matrix, word_table
+from placerec.frames import Reading, find_sequences
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary
 
 SPEC = DescriptorSpec(image_size=16)
@@ -82,17 +84,23 @@ def test_json_is_a_row_per_unit_without_nan() -> None:
     assert [blank[key] for key in ("place", "share", "typical_frame", "typical_sequence", "distance")] == [None] * 5
 
 
-def test_the_typical_frames_of_sequences_of_equal_image_names_are_told_apart() -> None:
+def test_the_typical_frames_of_sequences_of_equal_image_names_are_told_apart(tmp_path: Path) -> None:
     frames = replace(described(), frames=tuple(f"f{i % 30}.png" for i in range(60)))
-    sequences = [
-        Sequence(name, tuple(Frame(f"f{i}.png", np.nan, "", Path(name) / f"f{i}.png") for i in range(30)), Path(name))
-        for name in ("one", "two")
-    ]
+    for level in range(60):
+        path = tmp_path / ("one" if level < 30 else "two") / f"f{level % 30}.png"
+        path.parent.mkdir(exist_ok=True)
+        cv2.imwrite(str(path), np.full((8, 8), level, np.uint8))
+    sequences = find_sequences([tmp_path / "one", tmp_path / "two"], reading=Reading("sequences"))
     table = word_table(frames, dictionary())
-    paths = typical_paths(table, sequences)
-    expected = [None if i < 0 else Path("one" if i < 30 else "two") / f"f{i % 30}.png" for i in table.typical]
-    assert paths == expected
-    assert {path.parent.name for path in paths if path} == {"one", "two"}
+    levels = {unit: int(image[0, 0]) for unit, image in typical_images(table, sequences).items()}
+    assert levels == {unit: frame for unit, frame in enumerate(table.typical.tolist()) if frame >= 0}
+    assert {level < 30 for level in levels.values()} == {True, False}
+    some = list(levels)[::2]
+    assert set(typical_images(table, sequences, some)) == set(some)
+    for path in (tmp_path / "one").iterdir():
+        path.unlink()
+    with pytest.raises(SourceError, match="no such file"):
+        typical_images(table, sequences)
 
 
 def by_hand(**changes: Any) -> WordTable:

@@ -9,6 +9,7 @@ import pytest
 from placerec.errors import SourceError
 from placerec.frames import Reading, find_sequences
 from placerec.frames.folder import WANTED, natural_key
+from placerec.frames.recordings import WANTED as RECORDED
 
 
 def make(root: Path, *names: str) -> None:
@@ -90,7 +91,7 @@ def test_links_are_followed_but_not_in_circles_nor_twice(tmp_path: Path) -> None
 def test_images_beside_sequences_are_left_out_and_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     make(tmp_path, "map.png", "run/std_cam/t1.000000.jpeg")
     assert [sequence.name for sequence in find_sequences([tmp_path])] == ["run"]
-    assert caplog.messages == [f"{tmp_path}: its folders hold sequences; 1 images beside them not read"]
+    assert caplog.messages == [f"{tmp_path}: holds sequences; 1 images beside them not read"]
 
 
 def test_a_list_without_images_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -226,15 +227,15 @@ def test_the_current_folder_has_a_name(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_sources_that_are_none(tmp_path: Path) -> None:
-    make(tmp_path, "notes/readme.txt", "run.mp4", "seq/std_cam/readme.txt")
+    make(tmp_path, "notes/readme.txt", "seq/std_cam/readme.txt")
     (tmp_path / "void").mkdir()
-    looked = f"no sequence there; looked for std_cam/ and {WANTED}, 6 folders deep"
+    looked = f"no sequence there; looked for std_cam/, {WANTED}, {RECORDED}, 6 folders deep"
     assert WANTED == "images (*.jpg *.jpeg *.png *.bmp *.webp *.tif *.tiff *.pgm *.ppm)"
-    assert failure(tmp_path / "absent") == f"{tmp_path / 'absent'}: no such folder"
+    assert failure(tmp_path / "absent") == f"{tmp_path / 'absent'}: no such file or folder"
     assert failure(tmp_path / "void") == f"{tmp_path / 'void'}: {looked}"
     assert failure(tmp_path / "notes") == f"{tmp_path / 'notes'}: {looked}"
-    video = "is a file, and a folder is expected: a sequence or a folder of sequences"
-    assert failure(tmp_path / "run.mp4") == f"{tmp_path / 'run.mp4'}: {video}"
+    text = f"is a file of no kind that is read; name a folder of {WANTED}, or {RECORDED}"
+    assert failure(tmp_path / "notes/readme.txt") == f"{tmp_path / 'notes/readme.txt'}: {text}"
     assert failure(tmp_path) == f"{tmp_path / 'seq/std_cam'}: holds no image; looked for {WANTED}"
     assert failure(tmp_path, format="cold") == "format 'cold' is not known; choose one of auto, sequences, places"
 

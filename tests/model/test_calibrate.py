@@ -99,10 +99,21 @@ def test_training_sequences_are_refused_with_the_reason(world: Path, as_record: 
     with pytest.raises(ModelError) as raised:
         calibrate(world / "model", [world / "tokens/run3.tsv", world / "tokens/run2.tsv"])
     assert str(raised.value) == (
-        f"run2: trained {world / 'model'}, which is surer of it than of anything new; "
+        f"run2: trained the models of {world / 'model'}, which is surer of it than of anything new; "
         "calibrate on labelled sequences that trained neither the words nor the models"
     )
     assert path.read_bytes() == before
+
+
+def test_sequences_that_trained_the_words_are_refused(world: Path) -> None:
+    about = {"dictionary": "0" * 64, "trained_on": ["run1", "run3"]}
+    (world / "tokens/tokens.json").write_text(json.dumps(about))
+    with pytest.raises(ModelError, match=r"^run3: trained the words of "):
+        calibrate(world / "model", [world / "tokens/run4.tsv", world / "tokens/run3.tsv"])
+    calibrate(world / "model", [world / "tokens/run4.tsv"])
+    (world / "tokens/tokens.json").write_text(json.dumps(about | {"trained_on": 3}))
+    with pytest.raises(StreamError, match=r"tokens.json: is no description of tokens; tokenize again"):
+        calibrate(world / "model", [world / "tokens/run4.tsv"])
 
 
 def test_frames_without_a_known_label_are_left_out_and_counted(world: Path, caplog: pytest.LogCaptureFixture) -> None:

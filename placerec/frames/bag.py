@@ -1,0 +1,190 @@
+"""Recordings of ROS 1 (.bag), ROS 2 (folders with metadata.yaml, .db3, .mcap), read by `rosbags` without ROS."""
+
+import logging
+import struct
+from array import array
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from placerec.errors import MissingExtraError, PlacerecError, SourceError
+from placerec.frames.ros_image import COMPRESSED, RAW, gray_of
+from placerec.frames.sequence import Frame, Gray
+
+SUFFIXES = (".bag", ".db3", ".mcap")
+METADATA = "metadata.yaml"
+# Messages that may wait for one that came later but is older; a clock that was set is worse than that.
+_WAITING = 100
+_REMEDIES = {
+    ".bag": "mend it with `rosbag reindex`, or remove it",
+    ".mcap": "mend it with `mcap recover`, or remove it",
+}
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Bag:
+    """Every `every`-th image of a topic, in order of time. `ranks`: the place in that order of each stored message."""
+
+    path: Path
+    topic: str
+    every: int
+    ranks: "array[int]" = field(repr=False, compare=False)
+    frames: tuple[Frame, ...] = field(repr=False, compare=False)
+
+    @property
+    def endless(self) -> bool:
+        return False
+
+    def files(self) -> list[Path]:
+        return sorted(path for path in self.path.iterdir() if path.is_file()) if self.path.is_dir() else [self.path]
+
+    def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+        waiting: dict[int, tuple[str, bytes]] = {}
+        number = first
+        with _opened(self.path) as reader:
+            for rank, (kind, _, data) in zip(self.ranks, _messages(reader, self.path, self.topic), strict=False):
+                index, between = divmod(rank, self.every)
+                if not between and index >= first:
+                    waiting[index] = kind, data
+                while number in waiting:
+                    yield self.frames[number], self._gray(self.frames[number], *waiting.pop(number))
+                    number += 1
+                if number == len(self.frames):
+                    return
+        for frame in self.frames[number:]:
+            yield frame, f"{self.path}: frame {frame.name} cannot be read again"
+
+    def _gray(self, frame: Frame, kind: str, data: bytes) -> Gray | str:
+        name = f"{self.path}: frame {frame.name} of {self.topic}"
+        try:
+            return gray_of(_parser(_is_ros1(self.path))(data, kind), kind, name)
+        except PlacerecError as error:
+            return str(error)
+        except Exception as error:  # Of what a damaged message makes the parser raise there is no list.
+            return f"{name} cannot be read ({_reason(error)})"
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is named or laid out as a bag is."""
+    if path.is_dir():
+        return (path / METADATA).is_file() and any(any(path.glob(name)) for name in ("*.db3*", "*.mcap*"))
+    return path.suffix.lower() in SUFFIXES
+
+
+def list_bag(path: Path, topic: str | None) -> tuple[str, "array[int]", list[float]]:
+    """The topic of images in a bag, the rank of each of its messages in order of time, and the times in that order.
+
+    Times are the header's stamps in seconds, or where such a stamp is 0 when the message was stored; if the stamps jump
+    about, all are of the latter. Raises MissingExtraError without rosbags, SourceError for a bag that cannot be read
+    or without such a topic; what a damaged bag still gives is kept, and the rest told of in a warning.
+    """
+    stamps, stored = array("q"), array("q")
+    with _opened(path) as reader:
+        topic = _choose(path, reader, topic)
+        for _, when, data in _messages(reader, path, topic):
+            stamps.append(_stamp(data, _is_ros1(path)) or when)
+            stored.append(when)
+    if not stored:
+        raise SourceError(f"{path}: holds no image on {topic}; name another topic, or remove it")
+    times = np.array(stamps, np.int64)
+    order = np.argsort(times, kind="stable")
+    if np.abs(order - np.arange(len(order))).max() > _WAITING:
+        log.warning("%s: the stamps on %s jump; the times are those at which images were stored", path, topic)
+        times = np.array(stored, np.int64)
+        order = np.argsort(times, kind="stable")
+    ranks = np.empty(len(order), np.int64)
+    ranks[order] = np.arange(len(order))
+    return topic, array("q", ranks.tolist()), (times[order] / 1e9).tolist()
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    try:
+        from rosbags.rosbag1 import Reader as Reader1
+        from rosbags.rosbag2 import Reader as Reader2
+    except ImportError as error:
+        raise MissingExtraError("rosbags", f"{path}: a bag", "pip install 'placerec[bag]'") from error
+    try:
+        reader = Reader1(path) if _is_ros1(path) else Reader2(path)
+        reader.open()
+    except OSError as error:
+        raise SourceError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except Exception as error:  # Of what a damaged file makes the parser raise there is no list.
+        remedy = _REMEDIES.get(path.suffix, "mend it with `ros2 bag reindex`, or remove it")
+        raise SourceError(f"{path}: cannot be read as a bag ({_reason(error)}); {remedy}") from error
+    try:
+        yield reader
+    finally:
+        reader.close()
+
+
+def _is_ros1(path: Path) -> bool:
+    return path.suffix.lower() == ".bag"
+
+
+@cache
+def _parser(ros1: bool) -> Callable[[bytes, str], Any]:
+    """What makes a message of its bytes and type; both types are the same in all releases of ROS 1, and of ROS 2."""
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST)
+    return store.deserialize_ros1 if ros1 else store.deserialize_cdr
+
+
+def _choose(path: Path, reader: Any, topic: str | None) -> str:
+    """The topic that is asked for, or the only one of images."""
+    kinds = {connection.topic: connection.msgtype for connection in reader.connections}
+    images: list[str] = sorted(name for name, kind in kinds.items() if kind in (RAW, COMPRESSED))
+    if topic is not None:
+        topic = next((name for name in (topic, f"/{topic}") if name in kinds), topic)
+        if topic in images:
+            return topic
+        what = f"{topic} is of {kinds[topic]}, not of images" if topic in kinds else f"has no topic {topic}"
+        raise SourceError(f"{path}: {what}; its topics of images are: {_listed(images)}")
+    if len(images) == 1:
+        return images[0]
+    if images:
+        raise SourceError(f"{path}: has several topics of images: {_listed(images)}; choose one (--topic)")
+    others = _listed([f"{name} ({kind})" for name, kind in sorted(kinds.items())])
+    raise SourceError(f"{path}: has no topic of images; its topics are: {others}")
+
+
+def _messages(reader: Any, path: Path, topic: str) -> Iterator[tuple[str, int, bytes]]:
+    """Type, nanoseconds and data of the messages on a topic, as long as they can be read."""
+    connections = [one for one in reader.connections if one.topic == topic and one.msgtype in (RAW, COMPRESSED)]
+    messages = iter(reader.messages(connections=connections))
+    count = 0
+    while True:
+        try:
+            connection, when, data = next(messages)
+        except StopIteration:
+            return
+        except Exception as error:  # Of what a damaged file makes the parser raise there is no list.
+            log.warning("%s: is damaged behind %d images (%s); the rest is not read", path, count, _reason(error))
+            return
+        yield connection.msgtype, when, data
+        count += 1
+
+
+def _stamp(data: bytes, ros1: bool) -> int:
+    """The header's stamp in nanoseconds, 0 if there is none: both types of message begin with their header."""
+    # ROS 1 has a counter before it, ROS 2 the note of CDR, whose second byte tells the order of bytes.
+    order = "<" if ros1 or (len(data) > 1 and data[1] & 1) else ">"
+    if len(data) < 12:
+        return 0
+    seconds, nanoseconds = struct.unpack_from(f"{order}iI", data, 4)
+    return int(seconds) * 10**9 + int(nanoseconds)
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:10]) + (f" and {len(names) - 10} more" if len(names) > 10 else "") if names else "none"
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

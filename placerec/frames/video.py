@@ -1,0 +1,209 @@
+"""A video file, through OpenCV's FFmpeg: its frames are listed from the packets, and decoded in one pass.
+
+The packets have the exact times of all frames, and to walk them costs no decoding. Frames are found again by their
+times, for a decoder leaves out what is damaged.
+"""
+
+import logging
+import os
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from placerec.errors import SourceError
+from placerec.frames.image import as_gray, quiet
+from placerec.frames.sequence import Frame, Gray
+
+SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".flv", ".ogv", ".3gp", ".mts")
+# Seconds within which two times are one.
+_SAME = 0.0002
+# As many packets in a row that cannot be read are the end.
+_DAMAGED = 1000
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Video:
+    """Every `every`-th frame of a video file. `times`: of all its frames; `frames`: those that are read."""
+
+    path: Path
+    every: int
+    times: "array[float]" = field(repr=False, compare=False)
+    frames: tuple[Frame, ...] = field(repr=False, compare=False)
+
+    @property
+    def endless(self) -> bool:
+        return False
+
+    def files(self) -> list[Path]:
+        return [self.path]
+
+    def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+        if first >= len(self.frames):
+            return
+        with _opened(self.path) as capture:
+            for position, decoded in _decoded(capture, self.times, late=self.path.suffix.lower() == ".avi"):
+                index, between = divmod(position, self.every)
+                if between or index < first:
+                    continue
+                name = f"{self.path}: frame {self.frames[index].name}"
+                yield self.frames[index], _gray(capture, name) if decoded else f"{name} cannot be decoded"
+                if index == len(self.frames) - 1:
+                    return
+
+
+def list_times(path: Path) -> "array[float]":
+    """The times of all frames of a video in seconds from its start, in order; nothing but the first is decoded.
+
+    Raises SourceError for what is no video, holds no frame, or none that OpenCV can decode; a video that is shorter
+    than its header says is told of in a warning.
+    """
+    _check_readable(path)
+    with _opened(path, packets=True) as capture:
+        # What comes before the start is there for the decoder's sake: it is cut off by the container.
+        times = array("d", sorted(time for time in _walked(path, capture) if time > -_SAME))
+    if any(after - before < _SAME for before, after in pairwise(times)):
+        # MPEG program streams: not every packet has its time.
+        with _opened(path) as capture:
+            times = _increasing(_walked(path, capture), 1 / (_rate(capture) or 25))
+    with _opened(path) as capture:
+        if not times or not any(_grab(capture) for _ in times):
+            codec = _codec(capture)
+            raise SourceError(f"{path}: OpenCV can decode no frame of it (codec {codec}); convert it to H.264")
+        _tell_truncated(path, capture, times)
+    return times
+
+
+@contextmanager
+def _opened(path: Path, *, packets: bool = False) -> Iterator[Any]:
+    import cv2
+
+    # FFmpeg writes to stderr unless it is told not to before its first use: what matters is found out and said here.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    # One thread: what several make of damaged H.264 is another picture from run to run.
+    how = [cv2.CAP_PROP_FORMAT, -1] if packets else [cv2.CAP_PROP_N_THREADS, 1]
+    with quiet():
+        # Absolute: FFmpeg takes a name with a colon for an address.
+        capture = cv2.VideoCapture(os.path.abspath(path), cv2.CAP_FFMPEG, how)
+    try:
+        if not capture.isOpened():
+            raise SourceError(f"{path}: is no video that OpenCV can read, or has lost its index; remove it")
+        yield capture
+    finally:
+        capture.release()
+
+
+def _walked(path: Path, capture: Any) -> Iterator[float]:
+    """The times of all packets or frames that can be read, in the order of the file."""
+    lost = failures = 0
+    while failures < _DAMAGED:
+        if _grab(capture):
+            lost, failures = lost + failures, 0
+            yield round(_seconds(capture), 6)
+        else:
+            # At a damaged packet as well as at the end.
+            failures += 1
+    if lost:
+        log.warning("%s: is damaged: %d packets are passed over", path, lost)
+
+
+def _increasing(found: Iterable[float], step: float) -> "array[float]":
+    """The times of decoded frames, where one that does not come after the one before it is a step after that."""
+    times = array("d")
+    for time in found:
+        times.append(time if not times or time > times[-1] + _SAME else round(times[-1] + step, 6))
+    return times
+
+
+def _decoded(capture: Any, times: "array[float]", *, late: bool) -> Iterator[tuple[int, bool]]:
+    """The position of every listed frame in order, and whether the decoder has it: it is the last one grabbed.
+
+    `late`: the container (AVI) has times of decoding alone, which B-frames are later than by a constant.
+    """
+    done, failures, before, lag = 0, 0, -1.0, None
+    while done < len(times) and failures <= len(times) - done:
+        if not _grab(capture):
+            failures += 1
+            continue
+        failures, seconds = 0, _seconds(capture)
+        if lag is None:
+            lag = seconds - times[0] if late else 0.0
+        found = bisect_left(times, seconds - lag - _SAME)
+        if not (done <= found < len(times) and times[found] - (seconds - lag) <= _SAME):
+            if before < seconds < times[done] + lag:
+                continue  # a frame that is not listed, for its packet is damaged
+            # A time that makes no sense, as of the last B-frame in MPEG files.
+            found = done
+        before = seconds
+        yield from ((missing, False) for missing in range(done, found))
+        yield found, True
+        done = found + 1
+    yield from ((missing, False) for missing in range(done, len(times)))
+
+
+def _gray(capture: Any, name: str) -> Gray | str:
+    import cv2
+
+    with quiet():
+        decoded, picture = capture.retrieve()
+    if not decoded:
+        return f"{name} cannot be decoded"
+    try:
+        return as_gray(picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), name)
+    except SourceError as error:
+        return str(error)
+
+
+def _grab(capture: Any) -> bool:
+    with quiet():
+        return bool(capture.grab())
+
+
+def _seconds(capture: Any) -> float:
+    import cv2
+
+    return float(capture.get(cv2.CAP_PROP_POS_MSEC)) / 1000
+
+
+def _rate(capture: Any) -> float:
+    import cv2
+
+    return float(capture.get(cv2.CAP_PROP_FPS))
+
+
+def _codec(capture: Any) -> str:
+    import cv2
+
+    code = int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF
+    text = code.to_bytes(4, "little").decode("latin-1").strip()
+    return text if text.isprintable() and text else "unknown"
+
+
+def _check_readable(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            if not file.read(1):
+                raise SourceError(f"{path}: is empty; copy it again or remove it")
+    except OSError as error:
+        raise SourceError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _tell_truncated(path: Path, capture: Any, times: "array[float]") -> None:
+    """Warn if the header speaks of clearly more frames and of a later end; a guess from the file's size may be off."""
+    import cv2
+
+    count, rate = float(capture.get(cv2.CAP_PROP_FRAME_COUNT)), _rate(capture)
+    if rate > 0 and len(times) < 0.95 * count - 2 and times[-1] < 0.95 * count / rate:
+        log.warning(
+            "%s: is truncated or damaged: %d frames up to second %.1f are there, of about %.0f up to second %.1f",
+            path,
+            len(times),
+            times[-1],
+            count,
+            count / rate,
+        )

@@ -1,0 +1,237 @@
+"""Live decoding: a belief for each frame as it comes, the newest one first; frames are dropped rather than late."""
+
+import logging
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from placerec.errors import ModelError, SourceError, StreamError, VisionError
+from placerec.frames import Frame, Reading, Sequence, find_sequences, read_gray
+from placerec.frames.camera import Camera
+from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt, paced
+from placerec.frames.sequence import Gray
+from placerec.hohmm import Belief, format_header
+from placerec.model.corpus import STREAM_SUFFIXES
+from placerec.model.decode import format_line
+from placerec.model.decoder import Decoder
+from placerec.model.decoding import PAPER, Decoding
+from placerec.model.load import load_model
+from placerec.model.recognize import make_recognizer
+
+if TYPE_CHECKING:
+    from placerec.vision import Dictionary
+
+log = logging.getLogger(__name__)
+
+EVERY = 5.0  # seconds between two notes of the same kind
+_STEP = math.log(1.01)
+_ANY = np.arange(64, dtype=np.uint8).reshape(8, 8)
+
+
+@dataclass(frozen=True)
+class LiveReport:
+    """What became of the frames: `seen` came, `answered` got a line, `dropped` came while another was worked on,
+    `unusable` held no image. `seconds`: from the first arrival to the last line.
+
+    Latency in seconds from a frame's arrival to the moment that its line was taken; nan without any. `median` and
+    `late`, the 95th percentile, are right to 1 %.
+    """
+
+    seen: int
+    answered: int
+    dropped: int
+    unusable: int
+    seconds: float
+    median: float
+    late: float
+    longest: float
+
+    def __str__(self) -> str:
+        rate = f" ({self.answered / self.seconds:.1f} a second)" if self.seconds > 0 else ""
+        text = f"frames seen {self.seen}, answered {self.answered}{rate}, dropped {self.dropped}"
+        if self.unusable:
+            text += f", unusable {self.unusable}"
+        if self.answered:
+            times = (f"{1000 * value:.1f}" for value in (self.median, self.late, self.longest))
+            text += "; ms from arrival to answer: median {}, 95th percentile {}, longest {}".format(*times)
+        return text
+
+
+def decode_live(
+    source: Path | str,
+    model: Path | str,
+    *,
+    words: Path | str,
+    reading: Reading = Reading(),
+    options: Decoding = PAPER,
+    scorer: str = "native",
+    as_json: bool = False,
+    make: Callable[..., Decoder] = make_recognizer,
+) -> Generator[str, None, None]:
+    """`placerec decode --live`: the lines of a beliefs file, each as soon as its frame has come; TSV with a header.
+
+    `source`: a camera, or a sequence whose frames have times, which is played at its own pace. See `follow_live`.
+    `make`: as for `decode`. Raises ModelError for options that look ahead or write files, and StreamError unless
+    `source` is one sequence of images.
+    """
+    from placerec.vision import Dictionary
+
+    if options.looks_ahead or options.explain:
+        raise ModelError("live decoding answers before later words are known: no smooth, viterbi, lag or explain")
+    if str(source).endswith(STREAM_SUFFIXES):
+        raise StreamError(f"{source}: is a token stream, and live decoding is of images; name a camera or a video")
+    dictionary = Dictionary.load(words)
+    decoder = make(load_model(model), options=options, scorer=scorer, dictionary=dictionary)
+    sequences = find_sequences([source], reading=reading, endless=True)
+    if len(sequences) > 1:
+        raise StreamError(f"{source}: holds {len(sequences)} sequences; name one of them to be played live")
+    header = None if as_json else format_header(decoder.places, unknown=decoder.unknown is not None)
+    for frame, belief in follow_live(sequences[0], dictionary, decoder):
+        if header is not None:
+            yield header
+            header = None
+        row = belief.word, belief.selected, belief.best, belief.probability.tolist(), belief.unknown
+        yield format_line(decoder.places, frame.name, frame.time, frame.place, *row, as_json=as_json)
+
+
+def follow_live(
+    sequence: Sequence,
+    dictionary: "Dictionary",
+    decoder: Decoder,
+    *,
+    tell: Callable[[LiveReport], None] | None = None,
+) -> Generator[tuple[Frame, Belief], None, None]:
+    """Each frame and the belief after it, until the sequence ends or, in the main thread, Ctrl-C is pressed.
+
+    Frames that come while another is worked on are dropped but for the newest. They count as frames without a word
+    for transitions per frame. So do frames without a usable image, which give no belief. Both are logged, and so is
+    the report at the end, which `tell` gets, too. Whoever iterates is part of the latency: a frame is answered when
+    the next one is asked for. Raises SourceError for a source that gives nothing, StreamError for times that are
+    needed and missing or go back.
+    """
+    tally = _Tally(sequence)
+    # Filters are made when they are first needed: not while the first frames wait.
+    dictionary.look(_ANY)
+    with closing(Feed(lambda stopped: _arrivals(sequence, stopped))) as feed, ended_by_interrupt(feed):
+        try:
+            for arrival in feed:
+                for _ in range(tally.missed(arrival)):
+                    decoder.skip()
+                belief = _believed(arrival, dictionary, decoder, tally)
+                if belief is not None:
+                    yield arrival.frame, belief
+                    tally.answered(time.monotonic(), arrival)
+        finally:
+            feed.stop()
+            report = tally.report(feed)
+            if report.seen:
+                log.info("%s: %s", tally.name, report)
+            if tell is not None:
+                tell(report)
+
+
+def _arrivals(sequence: Sequence, stopped: Stopped) -> Iterator[Arrival]:
+    if isinstance(sequence.recording, Camera):
+        return sequence.recording.arrivals(stopped)
+    return paced(_shots(sequence), stopped)
+
+
+def _shots(sequence: Sequence) -> Iterator[tuple[Frame, Gray | str]]:
+    if sequence.recording is not None:
+        yield from sequence.recording.shots()
+        return
+    for frame in sequence.frames:
+        try:
+            yield frame, read_gray(frame.path)
+        except SourceError as error:
+            yield frame, str(error)
+
+
+def _believed(arrival: Arrival, dictionary: "Dictionary", decoder: Decoder, tally: "_Tally") -> Belief | None:
+    frame, image = arrival.frame, arrival.image
+    try:
+        if isinstance(image, str):
+            raise VisionError(image)
+        word, distance = dictionary.look(image)
+    except VisionError as error:
+        tally.unusable(error)
+        decoder.skip()
+        return None
+    try:
+        if word in decoder:
+            return decoder.update(word, frame.time, distance)
+        return replace(decoder.skip(frame.time), word=word)
+    except ModelError as error:
+        raise StreamError(f"{tally.name}: frame {frame.name!r}: {error}") from error
+
+
+class _Tally:
+    """Counts what becomes of the frames, in constant memory, and says now and then what is lost."""
+
+    def __init__(self, sequence: Sequence) -> None:
+        self.name = str(sequence.recording) if isinstance(sequence.recording, Camera) else str(sequence.source)
+        self._next = self._dropped = self._unusable = 0
+        self._first = self._last = math.nan
+        self._longest = math.nan
+        # Latencies, to the nearest power of 1.01.
+        self._latencies: Counter[int] = Counter()
+        self._said: dict[str, float] = {}
+
+    def missed(self, arrival: Arrival) -> int:
+        """How many frames were dropped between this one and the one before."""
+        missed = arrival.number - self._next
+        self._next = arrival.number + 1
+        self._dropped += missed
+        if math.isnan(self._first):
+            self._first = arrival.came
+        if missed:
+            message = "%s: %d of %d frames dropped so far: they come faster than they are worked on"
+            self._say(message, self.name, self._dropped, self._next)
+        return missed
+
+    def unusable(self, error: VisionError) -> None:
+        """Take note of a frame that is no image."""
+        self._unusable += 1
+        self._say("%s; no belief for this frame, %d such so far", error, self._unusable)
+
+    def answered(self, now: float, arrival: Arrival) -> None:
+        """Take note that the answer to a frame was taken."""
+        latency = max(now - arrival.came, 1e-9)
+        self._last = now
+        self._longest = latency if math.isnan(self._longest) else max(latency, self._longest)
+        self._latencies[round(math.log(latency) / _STEP)] += 1
+
+    def report(self, feed: Feed) -> LiveReport:
+        """What is known by now."""
+        answered = self._latencies.total()
+        return LiveReport(
+            feed.seen,
+            answered,
+            feed.dropped,
+            self._unusable,
+            0.0 if math.isnan(self._last) else self._last - self._first,
+            self._quantile(0.5),
+            self._quantile(0.95),
+            self._longest,
+        )
+
+    def _quantile(self, share: float) -> float:
+        left = share * self._latencies.total()
+        for power in sorted(self._latencies):
+            left -= self._latencies[power]
+            if left <= 0:
+                return min(math.exp(power * _STEP), self._longest)
+        return math.nan
+
+    def _say(self, message: str, *args: object) -> None:
+        now = time.monotonic()
+        if now - self._said.get(message, -math.inf) >= EVERY:
+            self._said[message] = now
+            log.warning(message, *args)
