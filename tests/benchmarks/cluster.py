@@ -3,9 +3,9 @@
     PYTHONPATH=tests python tests/benchmarks/cluster.py SOURCE... [--rounds 3] [--rows 131072] [--price 0.04]
 
 Scheduler, workers and client are processes of this machine, on 127.0.0.1; each worker has one thread. What goes
-between the client and the scheduler is counted by a relay between them. `describe`, `tokenize` and `train-lm` do the
-frames of the sources; `PCA` and `epoch` of the map do synthetic descriptors (each of 300 spots, plus noise), for which
-the sources have too few frames. Runs without a cluster, with one and with two workers take turns, and the median of
+between the client and the scheduler is counted by a relay between them. `describe` and `tokenize` do the frames of the
+sources; for the others these are too few: `PCA` and `epoch` of the map do synthetic descriptors (each of 300 spots,
+plus noise), `train-lm` counts words that were drawn at random, eight times as many. Runs without a cluster, with one and with two workers take turns, and the median of
 the rounds counts. A unit is a frame (of `epoch`: in one epoch). The tables are Markdown.
 """
 
@@ -30,11 +30,12 @@ from machines import Machines, machines_in
 from placerec.cluster import cluster
 from placerec.frames import find_sequences
 from placerec.jobs import Far
-from placerec.model import Options, train_lm
+from placerec.model import train_lm
 from placerec.vision import DescriptorSpec, Dictionary, describe_sources
 from placerec.vision.chunks import stored
-from placerec.vision.pca import fit_pca, moments, projected
+from placerec.vision.pca import fit_pca, moments, project
 from placerec.vision.som import train_som
+from placerec.words import WordStream, write_stream, write_vocabulary
 from placerec.words.tokenize import tokenize
 
 SIDE, EPOCHS = 20, 10
@@ -126,7 +127,7 @@ def row(units: int, runs: dict[int, list[Run]]) -> Row:
     return Row(here, one, two, sent, received, 1e3 * client)
 
 
-def arithmetic(rows: dict[str, Row], price: float, stored: float, listed: float) -> None:
+def arithmetic(rows: dict[str, Row], price: float, streams: float, listed: float) -> None:
     """What 10^9 frames take, if nothing but their number changes."""
     print(f"\n| for 10^9 frames | core-hours | on 1000 cores | at {price} a core-hour | moved | cores a client feeds |")
     print("| --- | --- | --- | --- | --- | --- |")
@@ -143,7 +144,7 @@ def arithmetic(rows: dict[str, Row], price: float, stored: float, listed: float)
         cells = f"{hours:.0f} | {hours / 1000:.2g} h | {price * hours:.0f} | {moved / 1e3:.2f} TB"
         print(f"| {title} | {cells} | {got.one / got.client:.0f} |")
     print(
-        f"\ntoken streams: {stored:.0f} bytes a frame; the list of frames in the client's memory: {listed:.0f} a frame"
+        f"\ntoken streams: {streams:.0f} bytes a frame; the list of frames in the client's memory: {listed:.0f} a frame"
     )
 
 
@@ -155,19 +156,24 @@ def jobs(sources: list[Path], rows: int, folder: Path) -> list[tuple[str, int, J
     spots = rng.normal(size=(300, spec.length))
     values = (spots[np.sort(rng.integers(300, size=rows))] + 0.3 * rng.normal(size=(rows, spec.length))).astype("f4")
     pca = fit_pca(moments(values[:4096]))
-    words = Dictionary.fit(values[:4096], spec=spec, size=SIDE, epochs=2)
-    words.save(folder / "words.npz")
-    print(f"sent once, beside what is told of a frame: {len(pickle.dumps(words))} bytes for tokenize")
-    tokenize(sources, folder / "words.npz", folder / "tokens")
+    codes = project(values, pca)
+    Dictionary.fit(values[:4096], spec=spec, size=SIDE, epochs=2).save(folder / "words.npz")
+    words = Dictionary.load(folder / "words.npz")
+    print(f"tokenize sends once, and counts among what it sends: {len(pickle.dumps(words))} bytes")
+    (folder / "tokens").mkdir()
+    for place in ("hall", "kitchen"):
+        named = [words.vocabulary[unit] for unit in rng.integers(SIDE**2, size=4 * rows).tolist()]
+        write_stream(WordStream.of(place, named, [place] * len(named)), folder / f"tokens/{place}.tsv")
+    write_vocabulary(words.vocabulary, folder / "tokens/vocab.txt")
 
     def epochs(work: Far | None) -> None:
-        with stored(projected(values, pca), work) as codes:
-            train_som(codes, SIDE, rng=np.random.default_rng(0), epochs=EPOCHS)
+        with stored(codes, work) as kept:
+            train_som(kept, SIDE, rng=np.random.default_rng(0), epochs=EPOCHS)
 
     return [
         ("describe", frames, lambda work: describe_sources(sources, folder / "d.npz", work=work)),
         ("tokenize", frames, lambda work: tokenize(sources, folder / "words.npz", folder / "t", work=work)),
-        ("train-lm", frames, lambda work: train_lm([folder / "tokens"], folder / "m", options=Options(3), work=work)),
+        ("train-lm", 8 * rows, lambda work: train_lm([folder / "tokens"], folder / "m", options=work=work)),
         ("PCA", rows, lambda work: moments(values, work)),
         ("epoch", rows * EPOCHS, epochs),
     ]
@@ -197,7 +203,6 @@ def main(sources: list[Path], rounds: int, rows: int, price: float) -> None:
     with tempfile.TemporaryDirectory() as name, machines_in(Path(name)) as machines:
         meter = Meter(machines.address.rpartition(":")[2])
         todo = jobs(sources, rows, Path(name))
-        stored = sum(path.stat().st_size for path in Path(name, "tokens").glob("*.tsv")) / len(listing)
         print(f"map of {SIDE} x {SIDE}; {rounds} rounds\n")
         print("| work | units | ms a unit, no cluster | 1 worker | 2 workers | gain | sent | received | client, ms |")
         print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
@@ -210,7 +215,8 @@ def main(sources: list[Path], rounds: int, rows: int, price: float) -> None:
             cells = f"{units} | {got.here:.3g} | {got.one:.3g} | {got.two:.3g} | {got.one / got.two:.2f}"
             print(f"| {title} | {cells} | {got.sent:.0f} | {got.received:.0f} | {got.client:.3g} |", flush=True)
         meter.close()
-        arithmetic(found, price, stored, listed)
+        streams = sum(path.stat().st_size for path in Path(name, "t").glob("*.tsv")) / len(listing)
+        arithmetic(found, price, streams, listed)
         idle(machines)
 
 
