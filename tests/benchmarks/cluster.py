@@ -5,8 +5,9 @@
 Scheduler, workers and client are processes of this machine, on 127.0.0.1; each worker has one thread. What goes
 between the client and the scheduler is counted by a relay between them. `describe` and `tokenize` do the frames of the
 sources; for the others these are too few: `PCA` and `epoch` of the map do synthetic descriptors (each of 300 spots,
-plus noise), `train-lm` counts words that were drawn at random, eight times as many. Runs without a cluster, with one and with two workers take turns, and the median of
-the rounds counts. A unit is a frame (of `epoch`: in one epoch). The tables are Markdown.
+plus noise), `train-lm` counts words that were drawn at random, eight times as many. Runs without a cluster, with one
+and with two workers take turns, and the median of the rounds counts. A unit is a frame (of `epoch`: in one epoch). The
+tables are Markdown.
 """
 
 import argparse
@@ -129,7 +130,7 @@ def row(units: int, runs: dict[int, list[Run]]) -> Row:
 
 def arithmetic(rows: dict[str, Row], price: float, streams: float, listed: float) -> None:
     """What 10^9 frames take, if nothing but their number changes."""
-    print(f"\n| for 10^9 frames | core-hours | on 1000 cores | at {price} a core-hour | moved | cores a client feeds |")
+    print(f"\n| for 10^9 frames | core-hours | on 100 cores | at {price} a core-hour | moved | cores a client feeds |")
     print("| --- | --- | --- | --- | --- | --- |")
     for title, name, times in (
         ("describe", "describe", 1),
@@ -139,9 +140,9 @@ def arithmetic(rows: dict[str, Row], price: float, streams: float, listed: float
         ("train-lm", "train-lm", 1),
     ):
         got = rows[name]
-        hours = 1e9 * times * got.one / 3.6e6
+        hours, client = (1e9 * times * each / 3.6e6 for each in (got.one, got.client))
         moved = times * (got.sent + got.received)
-        cells = f"{hours:.0f} | {hours / 1000:.2g} h | {price * hours:.0f} | {moved / 1e3:.2f} TB"
+        cells = f"{hours:.0f} | {max(hours / 100, client):.2g} h | {price * hours:.0f} | {moved / 1e3:.2f} TB"
         print(f"| {title} | {cells} | {got.one / got.client:.0f} |")
     print(
         f"\ntoken streams: {streams:.0f} bytes a frame; the list of frames in the client's memory: {listed:.0f} a frame"
@@ -173,7 +174,7 @@ def jobs(sources: list[Path], rows: int, folder: Path) -> list[tuple[str, int, J
     return [
         ("describe", frames, lambda work: describe_sources(sources, folder / "d.npz", work=work)),
         ("tokenize", frames, lambda work: tokenize(sources, folder / "words.npz", folder / "t", work=work)),
-        ("train-lm", 8 * rows, lambda work: train_lm([folder / "tokens"], folder / "m", options=work=work)),
+        ("train-lm", 8 * rows, lambda work: train_lm([folder / "tokens"], folder / "m", work=work)),
         ("PCA", rows, lambda work: moments(values, work)),
         ("epoch", rows * EPOCHS, epochs),
     ]
