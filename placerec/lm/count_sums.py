@@ -17,7 +17,7 @@ from placerec.lm.stored_text import Numbers, StoredText
 from placerec.lm.trie import Ints, Vocabulary
 
 # A piece of a text, by the text's number: word numbers (T,) and lengths of sentences (S,).
-Piece = tuple[int, Ints, Ints]
+Piece = tuple[int, Numbers, Ints]
 # Its counts, by the text's number: per order the n-grams (m, n) and how often each occurs (m,).
 Counted = tuple[int, list[Ints], list[Numbers]]
 
@@ -36,8 +36,9 @@ def count_texts(
     """
     ordered = Vocabulary.of((UNKNOWN, SENTENCE_START, SENTENCE_END, *vocabulary))
     unknown = ordered.index[UNKNOWN]
+    narrow = np.min_scalar_type(len(ordered))  # so that little is sent
     pieces = (
-        (text, tokens, lengths)
+        (text, tokens.astype(narrow), lengths)
         for text, sentences in enumerate(texts)
         for tokens, lengths in numbered(sentences, lambda word: ordered.index.get(word, unknown), markers)
     )
