@@ -16,6 +16,8 @@ import placerec
 T = TypeVar("T")
 ENVIRONMENT = {
     **os.environ,
+    # As `dask worker` has it, which begins without its own supervisor here.
+    **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
     "PYTHONPATH": os.pathsep.join([str(Path(placerec.__file__).parent.parent), str(Path(__file__).parent)]),
 }
 
