@@ -5,9 +5,9 @@
 Scheduler, workers and client are processes of this machine, on 127.0.0.1; each worker has one thread. What goes
 between the client and the scheduler is counted by a relay between them. `describe` and `tokenize` do the frames of the
 sources; for the others these are too few: `PCA` and `epoch` of the map do synthetic descriptors (each of 300 spots,
-plus noise; the map four times as many), `train-lm` counts words that were drawn at random, eight times as many. Runs without a cluster, with one
-and with two workers take turns, and the median of the rounds counts. A unit is a frame (of `epoch`: in one epoch). The
-tables are Markdown.
+plus noise; for the map four times over), `train-lm` counts words that were drawn at random, eight times as many. Runs
+without a cluster, with one and with two workers take turns, and the median of the rounds counts. A unit is a frame (of
+`epoch`: in one epoch). The tables are Markdown.
 """
 
 import argparse
