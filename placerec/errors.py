@@ -1,6 +1,9 @@
 """What can go wrong for a reason that the user can mend: one class per room, one base for the border to catch."""
 
-from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 class PlacerecError(Exception):
@@ -46,6 +49,6 @@ class MissingExtraError(PlacerecError):
         super().__init__(f"{purpose} needs the package {package}, which is not installed: {remedy}")
 
 
-def at(path: Path | str, line: int, message: str) -> str:
+def at(path: "Path | str", line: int, message: str) -> str:
     """`message` with the position in front, as compilers print it."""
     return f"{path}:{line}: {message}"

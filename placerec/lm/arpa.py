@@ -23,8 +23,8 @@ from placerec.errors import LanguageModelError, at
 from placerec.files import read_text, write_text
 from placerec.lm.arpa_text import LOG_ZERO, first_lines
 from placerec.lm.backoff import BackoffModel, score_ids
-from placerec.lm.logs import Mask, Singles
-from placerec.lm.trie import Ints, Trie, Vocabulary
+from placerec.lm.logs import Ints, Mask, Singles
+from placerec.lm.trie import Trie, Vocabulary
 
 log = logging.getLogger(__name__)
 # No file has 10^18 n-grams; of more digits Python may not make a number.

@@ -11,8 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Mask, Singles
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints, Mask, Singles
 
 LOG_ZERO = -99.0
 Cells = NDArray[np.uint64]

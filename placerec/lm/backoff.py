@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Singles
-from placerec.lm.trie import Ints, Trie
+from placerec.lm.logs import Ints, Singles
+from placerec.lm.trie import Trie
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class BackoffModel:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """All listed words, <s>, </s> and <unk> among them."""
+        """All listed words, `<s>`, `</s>` and `<unk>` among them."""
         return self.trie.vocabulary.words
 
     def __contains__(self, word: str) -> bool:
@@ -37,7 +37,7 @@ class BackoffModel:
     def log10_p(self, word: str, history: Sequence[str] = ()) -> float:
         """log10 p(word | history); only the last order-1 words of the history matter.
 
-        A word that the model does not list is looked up as <unk>; without <unk> it has -inf.
+        A word that the model does not list is looked up as `<unk>`; without `<unk>` it has -inf.
         """
         recent = list(history)[-(self.order - 1) :] if self.order > 1 else []
         return float(self.score([*recent, word])[-1])
@@ -50,7 +50,7 @@ class BackoffModel:
         return score_ids(self, self.ids(words))[0]
 
     def ids(self, words: Sequence[str]) -> Ints:
-        """Word numbers int64 (T,); <unk>'s, or -1 if it is not listed, for words that are not listed."""
+        """Word numbers int64 (T,); `<unk>`'s, or -1 if it is not listed, for words that are not listed."""
         ids = self.trie.vocabulary.ids(words)
         ids[ids < 0] = self.trie.vocabulary.index.get("<unk>", -1)
         return ids

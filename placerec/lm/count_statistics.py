@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from placerec.errors import LanguageModelError
 from placerec.lm.counts import Mask, NgramCounts
-from placerec.lm.logs import EPSILON
-from placerec.lm.trie import Ints, per_context
+from placerec.lm.logs import EPSILON, Ints
+from placerec.lm.trie import per_context
 
 Floats = NDArray[np.float64]
 

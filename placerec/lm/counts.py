@@ -9,10 +9,11 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.lm.logs import Ints
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.row_index import RowIndex
 from placerec.lm.stored_text import BLOCK, Block, Numbers, StoredText
-from placerec.lm.trie import Ints, Trie, Vocabulary, build_trie, endings
+from placerec.lm.trie import Trie, Vocabulary, build_trie, endings
 from placerec.lm.windows import changes, distinct_windows
 
 Mask = NDArray[np.bool_]
@@ -41,8 +42,8 @@ def count_ngrams(
 ) -> NgramCounts:
     """Count the n-grams of orders 1..`order` in sentences of words.
 
-    With `markers`, every sentence is counted between <s> and </s>. With `vocabulary` the vocabulary is closed: other
-    words are counted as <unk>. No n-gram spans two sentences. The semantics are those of ngram-count
+    With `markers`, every sentence is counted between `<s>` and `</s>`. With `vocabulary` it is closed: other
+    words are counted as `<unk>`. No n-gram spans two sentences. The semantics are those of ngram-count
     (sections 3 and 4 of our SRILM specification). The sentences may be more than memory holds; OutputError if they
     are, and a temporary file cannot be written.
     """

@@ -11,9 +11,9 @@ import numpy as np
 
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.gather import trie_of
-from placerec.lm.logs import EPSILON, Floats, Mask, Singles, log10, p_of
+from placerec.lm.logs import EPSILON, Floats, Ints, Mask, Singles, log10, p_of
 from placerec.lm.trace import Trace
-from placerec.lm.trie import Ints, Trie, Vocabulary, build_trie, endings, per_context
+from placerec.lm.trie import Trie, Vocabulary, build_trie, endings, per_context
 
 
 @dataclass

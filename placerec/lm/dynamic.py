@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placerec.lm.logs import LN10, Floats, Mask, Singles, log10, p_of
-from placerec.lm.trie import Ints
+from placerec.lm.logs import LN10, Floats, Ints, Mask, Singles, log10, p_of
 
 
 def mixed(log10_ps: Singles, weights: Floats) -> Singles:

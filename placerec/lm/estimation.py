@@ -10,11 +10,11 @@ from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import Mask, NgramCounts
 from placerec.lm.discounts import Context, Floats, Rule
 from placerec.lm.draft import Draft, insert_prefixes, weigh_contexts
-from placerec.lm.logs import EPSILON, Singles, log10, p_of
+from placerec.lm.logs import EPSILON, Ints, Singles, log10, p_of
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import Smoothing
 from placerec.lm.trace import SILENT, Trace
-from placerec.lm.trie import Ints, Trie, per_context, runs
+from placerec.lm.trie import Trie, per_context, runs
 
 
 def estimate(
@@ -28,7 +28,7 @@ def estimate(
     """The back-off model of `counts` under `smoothing` (see `placerec.lm.smoothing`).
 
     `min_count`: n-grams of order n seen less than `min_count[n-1]` times are left out, the last entry repeats.
-    `non_events`: words that are never predicted (but may be context), beside <s>; <unk> is one unless
+    `non_events`: words that are never predicted (but may be context), beside `<s>`; `<unk>` is one unless
     `open_vocabulary`. Raises LanguageModelError if no word is left to predict.
     """
     if any(m < 1 for m in min_count) or not min_count:

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from placerec.lm.logs import Ints
 from placerec.lm.row_index import RowIndex
-from placerec.lm.trie import Ints, Trie, Vocabulary, build_trie, endings, runs
+from placerec.lm.trie import Trie, Vocabulary, build_trie, endings, runs
 
 
 def trie_of(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tuple[Trie, list[list[Ints]]]:

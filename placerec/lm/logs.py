@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 EPSILON = 3e-6
 LN10 = 2.30258509299404568402
+Ints = NDArray[np.int64]
 Singles = NDArray[np.float32]
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from placerec.lm.logs import Mask, Singles
+from placerec.lm.logs import Ints, Mask, Singles
 from placerec.lm.row_index import RowIndex
-from placerec.lm.trie import Ints
 
 
 class Entries(NamedTuple):
@@ -57,11 +57,11 @@ class Lookup(NamedTuple):
             before.append(codes)
         return before
 
-    def find(self, contexts: Sequence[Ints], digits: Ints) -> tuple[Singles, Ints]:
+    def find(self, contexts: Sequence[Ints], digits: Ints) -> tuple[Singles, NDArray[np.int8]]:
         """log10 p float32 (T,) of words after contexts, and the length (T,) of the n-gram that answers, 0 for none."""
         order, base = len(self.tables), self.V + 1
         row = self.tables[-1].rows.find(contexts[-1] * base + digits)
-        log10_p, answered = self.tables[-1].log10_p[row], np.full(len(digits), order)
+        log10_p, answered = self.tables[-1].log10_p.take(row, mode="wrap"), np.full(len(digits), order, np.int8)
         left = np.flatnonzero(row < 0)
         unanswered = [left]
         for n in range(order - 1, 0, -1):

@@ -4,22 +4,19 @@ The rule is that of section 6.8 of our SRILM specification, for all words of a t
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Mask, Singles
+from placerec.lm.logs import Ints, Mask, Singles
 from placerec.lm.row_index import RowIndex
-from placerec.lm.trie import Ints
 
 if TYPE_CHECKING:
     from placerec.lm.draft import Draft
 
 
-@dataclass(frozen=True)
-class Passage:
+class Passage(NamedTuple):
     """Sequences of words, one behind the other: word numbers `ids` (T,), -1 for a word that no model knows.
 
     `first` bool (T,): a sequence starts here, words before it are no context. `scored` bool (T,): the word is
@@ -43,13 +40,11 @@ class Passage:
         return position - np.maximum.accumulate(np.where(self.first, position, 0))
 
 
-@dataclass
 class Reading:
     """Where a model finds the words of a passage: `rows[n-1]` (T,) of the n-gram that ends at each word, or -1."""
 
-    draft: "Draft"
-    first: Mask
-    rows: list[Ints] = field(default_factory=list)
+    def __init__(self, draft: "Draft", first: Mask, ids: Ints) -> None:
+        self.draft, self.first, self.rows = draft, first, [ids]
 
     def before(self, k: int) -> Ints:
         """Rows of order k (T,): the k words before each word; -1 where they are not listed or not of its sequence."""
@@ -76,7 +71,7 @@ class Reading:
 
 def read_passage(draft: "Draft", passage: Passage) -> Reading:
     """Find the passage's n-grams in the model."""
-    reading = Reading(draft, passage.first, [passage.ids])
+    reading = Reading(draft, passage.first, passage.ids)
     unlisted = np.flatnonzero(passage.ids < 0)
     for n in range(2, draft.order + 1):
         before = reading.before(n - 1)

@@ -2,20 +2,20 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from placerec.lm.backoff import BackoffModel, score_ids
-from placerec.lm.logs import EPSILON, LN10, Floats, Mask, Singles
+from placerec.lm.logs import EPSILON, LN10, Floats, Ints, Mask, Singles
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
-from placerec.lm.trie import Ints
+
+if TYPE_CHECKING:
+    from placerec.lm.backoff import BackoffModel
 
 TOP_RANKS = (1, 5, 10)
 
 
-@dataclass(frozen=True)
-class Totals:
+class Totals(NamedTuple):
     """Sums over a text. Words without probability are counted (`oovs`: unknown, `zeroprobs`: known), not penalised.
 
     `log10_p`: of the others; `words`: without the </s> at sentence ends.
@@ -27,20 +27,13 @@ class Totals:
     zeroprobs: float = 0
     log10_p: float = 0
 
-    def __add__(self, other: "Totals") -> "Totals":
-        return Totals(
-            self.sentences + other.sentences,
-            self.words + other.words,
-            self.oovs + other.oovs,
-            self.zeroprobs + other.zeroprobs,
-            self.log10_p + other.log10_p,
-        )
+    def plus(self, other: "Totals") -> "Totals":
+        """Both texts together."""
+        return Totals(*(a + b for a, b in zip(self, other, strict=True)))
 
     def times(self, weight: float) -> "Totals":
         """The same text, counted `weight` times."""
-        return Totals(
-            *(weight * value for value in (self.sentences, self.words, self.oovs, self.zeroprobs, self.log10_p))
-        )
+        return Totals(*(weight * value for value in self))
 
     @property
     def perplexity(self) -> float | None:
@@ -60,15 +53,17 @@ def _perplexity(log10_p: float, predicted: float) -> float | None:
         return float(np.exp(np.float64(-(log10_p / predicted) * LN10)))
 
 
-def measure(model: BackoffModel, sentences: Iterable[Iterable[str]]) -> Totals:
+def measure(model: "BackoffModel", sentences: Iterable[Iterable[str]]) -> Totals:
     """The totals of sentences of words, each scored between <s> and </s>; no context spans two sentences."""
+    from placerec.lm.backoff import score_ids
+
     total = Totals()
     for sentence in sentences:
         words = [SENTENCE_START, *sentence, SENTENCE_END]
         ids = model.ids(words)
         unknown = np.array([word not in model or word == UNKNOWN for word in words[1:]], bool)
         log10_p = score_ids(model, ids)[0][1:].astype(np.float32)
-        total += tally(log10_p, unknown, ended=True)
+        total = total.plus(tally(log10_p, unknown, ended=True))
     return total
 
 
@@ -99,8 +94,7 @@ def tally_sentences(log10_p: Singles, unknown: Mask, scored: Mask, lengths: Ints
     return totals
 
 
-@dataclass(frozen=True)
-class Ranks:
+class Ranks(NamedTuple):
     """How well words are told from others: `tokens` and, of them, `words` (without sentence ends).
 
     `leading` and `leading_words` (3,): tokens and words whose rank is below 1, 5 and 10. `square` and `absolute`: the
@@ -114,7 +108,8 @@ class Ranks:
     square: float = 0
     absolute: float = 0
 
-    def __add__(self, other: "Ranks") -> "Ranks":
+    def plus(self, other: "Ranks") -> "Ranks":
+        """Both texts' tokens together."""
         return Ranks(
             self.words + other.words,
             self.tokens + other.tokens,

@@ -7,11 +7,10 @@ import numpy as np
 
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.draft import Draft, context_masses, drafts_of, insert_prefixes, reweigh, settle_masses
-from placerec.lm.logs import EPSILON, LN10, Floats, p_of
+from placerec.lm.logs import EPSILON, LN10, Floats, Ints, p_of
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.passage import joint_of_rows
 from placerec.lm.trace import SILENT, Trace
-from placerec.lm.trie import Ints
 
 
 def pruned(model: BackoffModel, threshold: float, *, shortest: int = 2) -> BackoffModel:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import OutputError
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints
 
 Numbers = NDArray[Any]
 # Words in a block: sorting what fits in a cache is faster.

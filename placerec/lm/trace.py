@@ -3,8 +3,7 @@
 Contexts of order n are given as rows of order n-1 (row 0 stands for the empty context where n is 1).
 """
 
-from placerec.lm.logs import Floats, Mask, Singles
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Floats, Ints, Mask, Singles
 
 
 class Trace:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
+from placerec.lm.logs import Ints
 
 
 @dataclass(frozen=True)

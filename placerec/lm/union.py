@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.lm.backoff import BackoffModel
+from placerec.lm.logs import Ints
 from placerec.lm.row_index import RowIndex
-from placerec.lm.trie import Ints, Trie, Vocabulary, build_trie, endings, runs
+from placerec.lm.trie import Trie, Vocabulary, build_trie, endings, runs
 
 Floats = NDArray[np.float64]
 # Words that are looked up together: the work space stays in cache, and memory does not grow with the text.

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.lm.ahead import work_ahead
+from placerec.lm.logs import Ints
 from placerec.lm.stored_text import Block, Numbers, StoredText
-from placerec.lm.trie import Ints
 
 # Windows that may wait for being merged.
 WAITING = 1 << 21

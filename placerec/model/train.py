@@ -50,7 +50,7 @@ class Options:
     """How language models are made; every name is that of the command line.
 
     `order`: n-gram order (1: the classical HMM). `delta`: see `placerec.lm.smoothing`; None for its default.
-    `min_count`: per order, the last repeats. `markers`: whether <s> and </s> are counted.
+    `min_count`: per order, the last repeats. `markers`: whether `<s>` and `</s>` are counted.
     """
 
     order: int = 2

@@ -6,7 +6,7 @@ import numpy as np
 
 from placerec.lm.draft import Draft
 from placerec.lm.gather import trie_of
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints
 from placerec.srilm.arpa_block import Block
 from placerec.srilm.arpa_reader import Reader
 from placerec.srilm.context_order import NEVER, ContextTimes

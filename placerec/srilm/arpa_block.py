@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Mask, Singles
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Floats, Ints, Mask, Singles
 from placerec.srilm.fields import LONGEST_NAME, PADDING, Fields, Packed, split_lines, with_odd_bytes
 
 LOG_ZERO = -99.0
+# So many numbers are sooner converted one by one.
+_FEW = 200
 _NUMBER = re.compile(rb"-?\d+(\.\d*)?([eE][-+]?\d+)?")
 
 
@@ -51,13 +52,13 @@ def parse_block(data: bytes, n: int, numbered: Callable[[Fields, Ints], Ints], *
     backoff = _weights(fields, begin[weighted] + n + 1, weights)
     if log10_p is None or backoff is None:
         return None
-    words = numbered(fields, (begin[:, None] + np.arange(1, n + 1)).ravel())
+    # Column by column: that makes few long loops of many short ones.
+    words = numbered(fields, (begin + np.arange(1, n + 1)[:, None]).ravel())
     if (words < 0).any():
         return None
     every = np.zeros(len(lines), np.float32)
     every[weighted] = backoff
-    words = words.reshape(-1, n)
-    return Block(lines + 1, words, log10_p, weighted, every, len(physical))
+    return Block(lines + 1, words.reshape(n, -1).T, log10_p, weighted, every, len(physical))
 
 
 def _weights(fields: Fields, at: Ints, what: str) -> Singles | None:
@@ -72,8 +73,10 @@ def _numbers(fields: Fields, at: Ints, *, most: float) -> Singles | None:
     value, plain = _short_decimals(fields, at)
     if not plain.all():
         longer = np.flatnonzero(~plain)
-        value[longer], plain = _decimals(fields, at[longer])
-        for i in longer[~plain].tolist():
+        if len(longer) > _FEW:
+            value[longer], plain = _decimals(fields, at[longer])
+            longer = longer[~plain]
+        for i in longer.tolist():
             text = fields.text(int(at[i]))
             if not _NUMBER.fullmatch(text):
                 return None
@@ -105,7 +108,7 @@ def _short_decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     start += negative
     size = fields.lengths[at] - negative - 2
     whole = bytes_[start] - np.uint8(ord("0"))
-    digits, plain = _eight_digits(fields.eights.take(start + 2), _FILLED[np.clip(size, 0, 8)])
+    digits, plain = _eight_digits(fields.eights[start + 2], _FILLED.take(size, mode="clip"))
     plain &= (whole <= 9) & (bytes_[start + 1] == _POINT) & (size >= 0) & (size <= 8)
     # Both are exact, so that the quotient is the float64 nearest to the decimal number.
     value = (whole * np.int64(10**8) + digits) / 1e8

@@ -1,12 +1,13 @@
 """Reading ARPA files tolerantly, line by line or many lines at once; section 8 of our SRILM specification."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable
+from io import BytesIO
+from itertools import chain
 
 import numpy as np
 
-from placerec.lm.logs import Mask
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints, Mask
 from placerec.srilm.arpa_block import LOG_ZERO, Block, parse_block
 from placerec.srilm.fields import Fields, NameTable
 from placerec.srilm.options import bounded_int, leading_float
@@ -75,48 +76,50 @@ class Reader:
 
     def read_all(self) -> None:
         lines = self.streams.lines(self.name)
-        data = lines.data
-        if b"\0" in data:
-            self.read_lines(lines)
-        start = 0
-        while start < len(data) and self.state != "done" and b"\0" not in data:
-            if self.state in ("ngrams", "skip") and data[start : start + 1] != b"\\":
-                start = self.read_section(data, start)
-                continue
-            end = data.find(b"\n", start) + 1 or len(data)
-            self.number += 1
-            self.take(data[start:end].decode("latin-1").removesuffix("\n"))
-            start = end
+        blocks = lines.blocks(_BLOCK)
+        for data in blocks:
+            if b"\0" in data:
+                self.read_lines(lines, chain([data], blocks))
+                break
+            start = 0
+            while start < len(data) and self.state != "done":
+                start = self.read_some(data, start)
         if self.state != "done":
             raise _FormatError("reached EOF before \\end\\")
 
-    def read_lines(self, lines: Lines) -> None:
-        """The same line by line, for files with NUL bytes, which join lines."""
-        for line in lines:
+    def read_lines(self, lines: Lines, blocks: Iterable[bytes]) -> None:
+        """Take all lines that are left one by one: NUL bytes join them."""
+        lines.number = self.number
+        for line in lines.of(physical for block in blocks for physical in BytesIO(block)):
+            if self.state != "done":
+                self.number = lines.number
+                self.take(line)
+        if self.state != "done":
             self.number = lines.number
-            self.take(line)
-            if self.state == "done":
-                return
-        self.number = lines.number
 
-    def read_section(self, data: bytes, start: int) -> int:
-        """Take the lines from `start` to the next one that starts with a backslash, many at a time."""
+    def read_some(self, data: bytes, start: int) -> int:
+        """Take the line at `start`; in a section, all lines to the next one that starts with a backslash."""
+        if self.state not in ("ngrams", "skip") or data.startswith(b"\\", start):
+            end = data.find(b"\n", start) + 1 or len(data)
+            self.take_lines(data[start:end])
+            return end
         end = _next_headline(data, start)
         if self.state == "skip":
             self.number += data.count(b"\n", start, end) + (not data.endswith(b"\n", start, end))
-            return end
-        for chunk in _chunks(data, start, end):
-            block = self.quick_block(chunk)
-            if block is not None:
-                self.keep_lines()
-                self.keep(block._replace(lines=block.lines + self.number))
-                self.read_so_far[self.section] += len(block.lines)
-                self.number += block.size
-                continue
-            for line in chunk.decode("latin-1").removesuffix("\n").split("\n"):
-                self.number += 1
-                self.take(line)
+        elif block := self.quick_block(data[start:end]):
+            self.keep_lines()
+            self.keep(block._replace(lines=block.lines + self.number))
+            self.read_so_far[self.section] += len(block.lines)
+            self.number += block.size
+        else:
+            self.take_lines(data[start:end])
         return end
+
+    def take_lines(self, data: bytes) -> None:
+        """Lines, one by one."""
+        for line in data.decode("latin-1").removesuffix("\n").split("\n"):
+            self.number += 1
+            self.take(line)
 
     def quick_block(self, chunk: bytes) -> Block | None:
         """The lines at once; None if one of them is unusual."""
@@ -258,14 +261,6 @@ class Reader:
 def _signed(text: str) -> int:
     size = bounded_int(text.lstrip("+-"))
     return -size if text.startswith("-") else size
-
-
-def _chunks(data: bytes, start: int, end: int) -> Iterator[bytes]:
-    """Whole lines."""
-    while start < end:
-        stop = data.find(b"\n", start + _BLOCK, end) + 1 or end
-        yield data[start:stop]
-        start = stop
 
 
 def _next_headline(data: bytes, start: int) -> int:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from placerec.lm.trie import Ints, Trie
+from placerec.lm.logs import Ints
+from placerec.lm.trie import Trie
 from placerec.srilm.hashing import table_order
 from placerec.srilm.messages import ContextOrder
 

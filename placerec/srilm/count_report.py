@@ -1,14 +1,13 @@
 """`ngram -counts`: the probability of a table of n-grams; section 10.4 of our SRILM specification."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from placerec.lm.logs import Floats, p_of
+from placerec.lm.logs import Floats, Ints, p_of
 from placerec.lm.markers import SENTENCE_END
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals
-from placerec.lm.trie import Ints
 from placerec.srilm.counts_file import MALFORMED, MOST_TOKENS, parse_count
 from placerec.srilm.report import RANKS, TOKENS, Printer, block
 from placerec.srilm.scorers import ModelView, Scorer
@@ -61,12 +60,12 @@ def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting
 
 
 def _add(total: _Sums, part: _Sums) -> None:
-    total.total += part.total
-    total.ranks += part.ranks
+    total.total = total.total.plus(part.total)
+    total.ranks = total.ranks.plus(part.ranks)
 
 
 def _whole(totals: Totals, counting: Counting) -> Totals:
-    return replace(totals, sentences=0, words=1) if counting.entropy else totals
+    return totals._replace(sentences=0, words=1) if counting.entropy else totals
 
 
 def _group(table: Table, scorer: Scorer, printer: Printer, counting: Counting, *, shown: bool) -> _Sums:
@@ -90,7 +89,7 @@ def _score(ngrams: Ints, counts: Floats, scorer: Scorer, printer: Printer, count
     # A word more behind each n-gram: the joint probability of what stands before it is the n-gram's.
     behind = np.full((m, 1), printer.words.index[printer.words.unknown])
     passage = Passage.of_rows(np.concatenate([ngrams, behind], axis=1))
-    passage = replace(passage, scored=passage.place == n - 1)
+    passage = passage._replace(scored=passage.place == n - 1)
     view = scorer.view(passage)
     scored = view.score()
     weights = counts
@@ -102,18 +101,19 @@ def _score(ngrams: Ints, counts: Floats, scorer: Scorer, printer: Printer, count
         t, word = i * (n + 1) + n - 1, ngram[-1]
         log10_p = float(scored.log10_p[t])
         zero, last = log10_p == -np.inf, word == end
-        sums.total += Totals(
+        totals = Totals(
             count if last else 0,
             0 if last else count,
             count if zero and word == unknown else 0,
             count if zero and word != unknown else 0,
             0 if zero else weight * log10_p,
         )
+        sums.total = sums.total.plus(totals)
         if printer.debug >= TOKENS:
             context = " ".join(printer.name(number) for number in ngram[-2::-1])
             p = float(p_of(scored.log10_p[t : t + 1])[0])
             text = printer.token(word, context + " ", scored.tag(t), p, log10_p, weight)
             printer.streams.print(text + printer.sum(view, t, np.array(ngram[:-1], np.int64)) + "\n")
         if printer.debug >= RANKS:
-            sums.ranks += printer.rank(view, t, word, log10_p, end=last, weight=count)
+            sums.ranks = sums.ranks.plus(printer.rank(view, t, word, log10_p, end=last, weight=count))
     return sums

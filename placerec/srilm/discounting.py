@@ -25,7 +25,7 @@ from placerec.lm.discounts import (
     natural,
     witten_bell,
 )
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints
 from placerec.srilm.options import Parsed, leading_float, leading_int
 from placerec.srilm.streams import SrilmError, Streams, tokens
 

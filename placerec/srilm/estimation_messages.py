@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from placerec.lm.counts import NgramCounts
-from placerec.lm.logs import Floats, Singles
-from placerec.lm.trie import Ints, build_trie, runs
+from placerec.lm.logs import Floats, Ints, Singles
+from placerec.lm.trie import build_trie, runs
 from placerec.srilm.first_seen import FirstSeen
 from placerec.srilm.hashing import walk_order
 from placerec.srilm.messages import Messages

@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.trie import Ints
+from placerec.lm.logs import Ints
+from placerec.lm.row_index import RowIndex
 
 Packed = NDArray[np.uint64]
 SHORT_NAME, LONGEST_NAME = 8, 16
@@ -68,11 +69,13 @@ def split_lines(data: bytes, size: int) -> tuple[Fields, Ints]:
 
 def _single_blanks(data: bytes, at: Ints, kind: NDArray[np.uint8]) -> tuple[Fields, Ints] | None:
     """The same where one separator stands behind every field, as programs write lines; `kind` (f,) `at` places (f,)."""
-    lengths = np.diff(at, prepend=-1) - 1
+    starts = np.zeros(len(at), np.int64)
+    np.add(at[:-1], 1, out=starts[1:])
+    lengths = at - starts
     line_end = kind == _LINE_END
     if (lengths == 0).any() or not (line_end | (kind == _BLANK) | (kind == _TAB)).all():
         return None
-    return Fields(data, at - lengths, lengths), np.diff(np.flatnonzero(line_end), prepend=-1)
+    return Fields(data, starts, lengths), np.diff(np.flatnonzero(line_end), prepend=-1)
 
 
 def _any_blanks(data: bytes, buffer: NDArray[np.uint8]) -> tuple[Fields, Ints]:
@@ -101,7 +104,7 @@ def without_comments(fields: Fields, count: Ints) -> tuple[Fields, Ints]:
 
 
 class NameTable:
-    """Word numbers by name, for many names at once: tables of hashed names of up to 16 bytes, the rest one by one."""
+    """Word numbers by name, for many names at once: those of up to 8 or 16 bytes as one or two numbers."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self.index = index
@@ -109,72 +112,32 @@ class NameTable:
         named = [(name.encode("latin-1"), number) for name, number in index.items() if len(name) <= LONGEST_NAME]
         packed = np.array([name for name, _ in named], f"S{LONGEST_NAME}").view("<u8").reshape(-1, 2)
         numbers = np.array([number for _, number in named], np.int64)
-        short = packed[:, 1] == 0
-        self.short = _HashedNames(packed[short, 0], packed[short, 1], numbers[short])
-        self.long = _HashedNames(packed[~short, 0], packed[~short, 1], numbers[~short])
+        long = packed[:, 1] > 0
+        self.short = RowIndex(packed[~long, 0].view(np.int64))
+        self.halves = RowIndex(packed[long].ravel().view(np.int64))
+        self.long = RowIndex(self._pairs(packed[long, 0], packed[long, 1]))
+        # At the end, what is found for a name that is not listed.
+        self.short_numbers, self.long_numbers = np.append(numbers[~long], -1), np.append(numbers[long], -1)
 
     def find(self, fields: Fields, at: Ints | slice) -> Ints:
         """The numbers of the fields `at` (m,), -1 for a name that is not listed."""
         start, length = fields.starts[at], fields.lengths[at]
-        long = length > SHORT_NAME
-        if not long.any():
-            return self.short.find_short(fields.eights.take(start) & _FILLED[length])
-        number = self.short.find_short(fields.eights.take(start) & _FILLED[np.minimum(length, SHORT_NAME)])
-        number[long] = self._find_long(fields, np.arange(len(fields.starts))[at][long])
+        # Of a longer name this is the start. `take` copies them all beforehand, which pays where most are asked for.
+        name = fields.eights.take(start)
+        name &= _FILLED.take(length, mode="clip")
+        number = self.short_numbers.take(self.short.find(name.view(np.int64)), mode="wrap")
+        long = np.flatnonzero(length > SHORT_NAME)
+        if len(long):
+            number[long] = self._find_long(fields, np.arange(len(fields.starts))[at][long])
         return number
 
     def _find_long(self, fields: Fields, at: Ints) -> Ints:
-        number = self.long.find(*fields.packed(at))
+        number = self.long_numbers[self.long.find(self._pairs(*fields.packed(at)))]
         for i in np.flatnonzero(fields.lengths[at] > LONGEST_NAME).tolist():
             number[i] = self.index.get(fields.text(int(at[i])).decode("latin-1"), -1)
         return number
 
-
-_MIX_LOW, _MIX_HIGH = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xC2B2AE3D27D4EB4F)
-# Few names are given more room: it is cheap, and fewer of them are after the same slot.
-_ROOMY_BITS, _ROOMY, _SLOTS_PER_NAME = 15, 32, 4
-
-
-class _HashedNames:
-    """Numbers (m,) by names of 16 bytes, as two numbers each."""
-
-    def __init__(self, low: Packed, high: Packed, numbers: Ints) -> None:
-        least, roomy = (max(8, (slots * len(low)).bit_length()) for slots in (_SLOTS_PER_NAME, _ROOMY))
-        bits = max(least, min(roomy, _ROOMY_BITS))
-        self.shift = np.uint64(64 - bits)
-        self.low, self.high = np.zeros(1 << bits, np.uint64), np.zeros(1 << bits, np.uint64)
-        self.number = np.full(1 << bits, -1)
-        slot = self._slot(low, high)
-        # Of several names for one slot the last is kept; those that lost it go to a table of their own.
-        self.number[slot], self.low[slot], self.high[slot] = numbers, low, high
-        lost = (self.low[slot] != low) | (self.high[slot] != high)
-        self.contested = np.zeros(1 << bits, bool)
-        self.contested[slot[lost]] = True
-        self.rest = _HashedNames(low[lost], high[lost], numbers[lost]) if lost.any() else None
-
-    def _slot(self, low: Packed, high: Packed | None) -> Ints:
-        mixed = low * _MIX_LOW if high is None else low * _MIX_LOW ^ high * _MIX_HIGH
-        slot: Ints = ((mixed ^ mixed >> np.uint64(32)) * np.uint64(0xBF58476D1CE4E5B9) >> self.shift).view(np.int64)
-        return slot
-
-    def find(self, low: Packed, high: Packed) -> Ints:
-        """The number of each name, -1 where it is not listed."""
-        return self._find(low, high)
-
-    def find_short(self, low: Packed) -> Ints:
-        """The same for names of up to eight bytes, in a table without others."""
-        return self._find(low, None)
-
-    def _find(self, low: Packed, high: Packed | None) -> Ints:
-        slot = self._slot(low, high)
-        number = self.number[slot]
-        missed = self.low[slot] != low
-        if high is not None:
-            missed |= self.high[slot] != high
-        if missed.any():
-            missed = np.flatnonzero(missed)
-            number[missed] = -1
-            if self.rest is not None:
-                missed = missed[self.contested[slot[missed]]]
-                number[missed] = self.rest._find(low[missed], None if high is None else high[missed])
-        return number
+    def _pairs(self, low: Packed, high: Packed) -> Ints:
+        """One number for two halves of names; one that is no name's if either is none's."""
+        first, second = self.halves.find(low.view(np.int64)), self.halves.find(high.view(np.int64))
+        return np.where(first < 0, -1, (first << np.int64(32)) + second + 1)

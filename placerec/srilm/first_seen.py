@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.lm.counts import NgramCounts
-from placerec.lm.trie import Ints, Trie, Vocabulary
+from placerec.lm.logs import Ints
+from placerec.lm.trie import Trie, Vocabulary
 from placerec.srilm.counts_file import Table
 from placerec.srilm.hashing import first_positions, walk_order
 from placerec.srilm.text import Text

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.lm.counts import occurrences
+from placerec.lm.logs import Ints
 from placerec.lm.stored_text import StoredText
-from placerec.lm.trie import Ints, Trie
+from placerec.lm.trie import Trie
 
 Mask = NDArray[np.bool_]
 _SMALL = 8

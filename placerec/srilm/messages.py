@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from placerec.lm.logs import LN10, Floats, Mask, Singles
+from placerec.lm.logs import LN10, Floats, Ints, Mask, Singles
 from placerec.lm.trace import Trace
-from placerec.lm.trie import Ints, Trie
+from placerec.lm.trie import Trie
 from placerec.srilm.streams import Streams
 
 # The place of each of some rows, int64, in the order in which SRILM comes by: (order, rows) -> places.

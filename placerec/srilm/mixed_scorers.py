@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.lm.dynamic import Cache, loglinear, mixed, posteriors, with_cache
-from placerec.lm.logs import Singles, p_of
+from placerec.lm.logs import Ints, Singles, p_of
 from placerec.lm.passage import Passage, used_context
-from placerec.lm.trie import Ints
 from placerec.srilm.scorers import Model, ModelView, Scored, Scorer, View, event_numbers
 from placerec.srilm.vocabulary import WordList
 

@@ -86,7 +86,7 @@ class Models:
                 self.draft, other = self.together(self.model(), self.read(option, "mix-lm file")[0])
                 merge(self.draft, other, merge_weight(weights, k), self.messages(self.draft))
         self.change()
-        model = Model(self.model(), self.words, options["skipoovs"])
+        model = Model(self.model(), self.words, skipping=options["skipoovs"])
         if not dynamic or not others:
             return model
         models = [model, *(Model(self.read(option, "mix-lm file")[0], self.words) for option in others)]

@@ -3,15 +3,13 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from placerec.srilm.streams import SrilmError, Streams
 from placerec.version import __version__
 
 
-@dataclass(frozen=True)
-class Option:
+class Option(NamedTuple):
     """One option: its kind (flag, int, unsigned, float, string), its default, and what it does in a few words.
 
     `refused`: named by the specification but not specified, so that it cannot be honoured.
@@ -26,13 +24,13 @@ class Option:
 Options = Mapping[str, Option]
 
 
-@dataclass
 class Parsed:
     """The values by name (without the hyphen), what was given, and the arguments that are no options."""
 
-    values: dict[str, Any]
-    given: set[str] = field(default_factory=set)
-    rest: list[str] = field(default_factory=list)
+    def __init__(self, values: dict[str, Any]) -> None:
+        self.values = values
+        self.given: set[str] = set()
+        self.rest: list[str] = []
 
     def __getitem__(self, name: str) -> Any:
         return self.values[name]

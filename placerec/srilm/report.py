@@ -1,15 +1,14 @@
 """What `ngram -ppl` and `ngram -counts` print: section 10 of our SRILM specification."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Mask, p_of
+from placerec.lm.logs import Floats, Ints, Mask, p_of
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
-from placerec.lm.trie import Ints
 from placerec.srilm.scorers import Scored, Scorer, View, event_numbers
 from placerec.srilm.sentences import Handling, Sentences, joined, mark, read_sentences
 from placerec.srilm.streams import Streams
@@ -52,13 +51,11 @@ def _ratio(part: float, whole: float) -> str:
     return f"{part / whole:.16g}" if whole else "-nan"
 
 
-@dataclass
 class Printer:
     """The lines and the ranks of single tokens, as much of them as `debug` asks for."""
 
-    words: WordList
-    streams: Streams
-    debug: int
+    def __init__(self, words: WordList, streams: Streams, debug: int) -> None:
+        self.words, self.streams, self.debug = words, streams, debug
 
     @cached_property
     def events(self) -> Ints:
@@ -114,8 +111,7 @@ def _score(
     return totals, _token_lines(printer, view, scored, _Batch(passage, lengths, ended, sentences.weights))
 
 
-@dataclass(frozen=True)
-class _Batch:
+class _Batch(NamedTuple):
     """Sentences: their words, and of each its length (S,), whether it ends in </s> (S,), and its weight (S,)."""
 
     part: Passage
@@ -124,12 +120,12 @@ class _Batch:
     weights: Floats
 
 
-@dataclass
 class _Line:
     """The lines of one sentence's tokens, and their ranks."""
 
-    text: list[str] = field(default_factory=list)
-    ranks: Ranks = field(default_factory=Ranks)
+    def __init__(self) -> None:
+        self.text: list[str] = []
+        self.ranks = Ranks()
 
 
 def _token_lines(printer: Printer, view: View, scored: Scored, batch: _Batch) -> list[_Line]:
@@ -155,7 +151,7 @@ def _token_lines(printer: Printer, view: View, scored: Scored, batch: _Batch) ->
         if printer.debug >= RANKS:
             last = t + 1 == len(words) or bool(part.first[t + 1])
             end, weight = bool(last and batch.ended[i]), float(batch.weights[i])
-            line.ranks += printer.rank(view, t, words[t], log10_p, end=end, weight=weight)
+            line.ranks = line.ranks.plus(printer.rank(view, t, words[t], log10_p, end=end, weight=weight))
     return lines
 
 
@@ -184,10 +180,10 @@ class _Summary:
     def _sentences(self, shown: Sequence[str], totals: Floats, lines: Sequence[_Line]) -> None:
         self.started |= len(totals) > 0
         whole = Totals(*totals.sum(axis=0).tolist())
-        self.total += whole
-        self.group += whole
+        self.total = self.total.plus(whole)
+        self.group = self.group.plus(whole)
         for text, row, line in zip(shown, totals.tolist(), lines, strict=False):
-            self.ranks += line.ranks
+            self.ranks = self.ranks.plus(line.ranks)
             ranks = line.ranks if self.printer.debug >= RANKS else None
             self.printer.streams.print(text + "\n" + "".join(line.text) + block(Totals(*row), ranks) + "\n")
 

@@ -5,16 +5,14 @@ specification.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from placerec.lm.logs import Mask, Singles
+from placerec.lm.logs import Ints, Mask, Singles
 from placerec.lm.lookup import Lookup
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage, answers, joint, look_up, look_up_others, read_passage, spread
-from placerec.lm.trie import Ints
 from placerec.srilm.vocabulary import WordList
 
 if TYPE_CHECKING:
@@ -59,8 +57,7 @@ def event_numbers(words: WordList) -> Ints:
     return np.array([number for number in words.index.values() if events[number]], np.int64)
 
 
-@dataclass(frozen=True)
-class Null:
+class Null(NamedTuple):
     """Probability 1 for every word (-null)."""
 
     words: WordList
@@ -70,8 +67,7 @@ class Null:
         return NullView(len(passage.ids), len(self.words.words))
 
 
-@dataclass(frozen=True)
-class NullView:
+class NullView(NamedTuple):
     """A passage of T words, of a vocabulary of V."""
 
     T: int
@@ -119,14 +115,12 @@ class LookupView:
         return self.lookup.find(contexts, self.lookup.digits(every))[0]
 
 
-@dataclass
 class Model:
     """A back-off model. `skipping`: probability 0 for unknown words and the two words behind them (-skipoovs)."""
 
-    draft: "Draft"
-    words: WordList
-    skipping: bool = False
-    _own: Ints = field(default_factory=lambda: np.zeros(0, np.int64), init=False)
+    def __init__(self, draft: "Draft", words: WordList, *, skipping: bool = False) -> None:
+        self.draft, self.words, self.skipping = draft, words, skipping
+        self._own = np.zeros(0, np.int64)
 
     def view(self, passage: Passage) -> "ModelView":
         """Read a passage."""
@@ -149,7 +143,7 @@ class ModelView:
         self.model = model
         self.own = model.own
         self.given = passage.ids
-        self.passage = replace(passage, ids=self.own[passage.ids])
+        self.passage = passage._replace(ids=self.own[passage.ids])
         self.reading = read_passage(model.draft, self.passage)
         self.unknown = model.words.index[model.words.unknown]
         self.near = np.zeros(len(passage.ids), bool)

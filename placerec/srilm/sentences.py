@@ -1,15 +1,15 @@
 """The text that `ngram -ppl` scores: lines to word numbers, with the markers that belong around them (section 10.1)."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from io import BytesIO
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Mask
+from placerec.lm.logs import Floats, Ints, Mask
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage
-from placerec.lm.trie import Ints
 from placerec.srilm.fields import PADDING, NameTable, split_lines, with_odd_bytes, without_comments
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import Lines, Streams, tokens
@@ -21,8 +21,7 @@ _NOTHING = -2
 _BLOCK, _BATCH = 1 << 19, 1 << 18
 
 
-@dataclass(frozen=True)
-class Handling:
+class Handling(NamedTuple):
     """What is done to sentences: which markers are put around them, words that are left out, and more.
 
     `weight`: where a line's weight stands (`first`, `last`, or nowhere); `escape`: the start of lines that are copied;
@@ -57,36 +56,42 @@ def read_sentences(name: str, words: WordList, handling: Handling, streams: Stre
     Too long lines are reported and left out.
     """
     lines = streams.lines(name)
-    if handling.weight or handling.escape is not None or handling.verbose or with_odd_bytes(lines.data):
-        return _read_carefully(lines, words, handling, streams)
-    return _read_quickly(lines, words, streams)
+    blocks = lines.blocks(_BLOCK)
+    if not (handling.weight or handling.escape is not None or handling.verbose):
+        names = NameTable(words.index)
+        for block in blocks:
+            if with_odd_bytes(block):
+                blocks = chain([block], blocks)
+                break
+            yield _read_quickly(lines, block, names, words, streams)
+        else:
+            return
+    yield from _read_carefully(lines, blocks, words, handling, streams)
 
 
-def _read_quickly(lines: Lines, words: WordList, streams: Streams) -> Iterator[Sentences]:
-    data, names, unknown = lines.data, NameTable(words.index), words.index[words.unknown]
-    start = line = 0
-    while start < len(data):
-        end = data.find(b"\n", start + _BLOCK) + 1 or len(data)
-        block = data[start:end].lower() if words.lower else data[start:end]
-        fields, lengths = without_comments(*split_lines(block + PADDING, len(block)))
-        numbers = names.find(fields, slice(None))
-        numbers[numbers < 0] = unknown
-        too_long = lengths > LONGEST
-        if too_long.any():
-            for number in np.flatnonzero(too_long).tolist():
-                streams.say(f"{lines.name}: line {line + number + 1}: too many words per sentence")
-            numbers, lengths = numbers[~np.repeat(too_long, lengths)], np.where(too_long, 0, lengths)
-        used = lengths[lengths > 0]
-        yield Sentences(numbers, used, np.ones(len(used)))
-        start, line = end, line + len(lengths)
+def _read_quickly(lines: Lines, block: bytes, names: NameTable, words: WordList, streams: Streams) -> Sentences:
+    block = block.lower() if words.lower else block
+    fields, lengths = without_comments(*split_lines(block + PADDING, len(block)))
+    numbers = names.find(fields, slice(None))
+    numbers[numbers < 0] = words.index[words.unknown]
+    too_long = lengths > LONGEST
+    if too_long.any():
+        for number in np.flatnonzero(too_long).tolist():
+            streams.say(f"{lines.name}: line {lines.number + number + 1}: too many words per sentence")
+        numbers, lengths = numbers[~np.repeat(too_long, lengths)], np.where(too_long, 0, lengths)
+    lines.number += len(lengths)
+    used = lengths[lengths > 0]
+    return Sentences(numbers, used, np.ones(len(used)))
 
 
-def _read_carefully(lines: Lines, words: WordList, handling: Handling, streams: Streams) -> Iterator[Sentences]:
+def _read_carefully(
+    lines: Lines, blocks: Iterable[bytes], words: WordList, handling: Handling, streams: Streams
+) -> Iterator[Sentences]:
     index, unknown = words.index, words.index[words.unknown]
     numbers: list[int] = []
     kept: list[tuple[int, float, str]] = []
     escapes: list[tuple[int, str]] = []
-    for line in lines:
+    for line in lines.of(physical for block in blocks for physical in BytesIO(block)):
         if len(numbers) + len(kept) >= _BATCH:
             yield _sentences(numbers, kept, escapes)
             numbers, kept, escapes = [], [], []

@@ -6,11 +6,8 @@ Text is handled as bytes kept in str (Latin-1), so that no byte is lost and word
 import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
-from functools import cached_property, wraps
-from io import BytesIO
-from pathlib import Path
+from contextlib import ExitStack, contextmanager, suppress
+from functools import wraps
 from typing import BinaryIO, TypeVar, cast
 
 from placerec.errors import PlacerecError
@@ -33,14 +30,12 @@ class SrilmError(PlacerecError):
         self.status = status
 
 
-@dataclass
 class Streams:
     """Standard input, output and error of one run, and whether `-` was read or written before."""
 
-    stdin: BinaryIO
-    stdout: BinaryIO
-    stderr: BinaryIO
-    used: set[str] = field(default_factory=set)
+    def __init__(self, stdin: BinaryIO, stdout: BinaryIO, stderr: BinaryIO) -> None:
+        self.stdin, self.stdout, self.stderr = stdin, stdout, stderr
+        self.used: set[str] = set()
 
     def say(self, message: str) -> None:
         """A line on standard error, at once."""
@@ -59,7 +54,7 @@ class Streams:
         with _named(name):
             path = _path(name)
             suffix = _packing(name)
-            if not suffix or (path.is_file() and not _is_packed(path, suffix)):
+            if not suffix or (os.path.isfile(path) and not _is_packed(path, suffix)):
                 return open(path, "rb")
             return _unpacking(path, suffix)
 
@@ -85,14 +80,15 @@ class Streams:
             yield self.stdout
             return
         with _named(name), ExitStack() as stack:
-            path = _path(name).resolve()
+            path = os.path.realpath(_path(name))
             suffix = _packing(name)
+            folder, base = os.path.split(path)
             # A device or a pipe has to be written itself; so has a file in a folder that takes no other.
-            direct = path.exists() and not (path.is_file() and os.access(path.parent, os.W_OK))
-            partial = path if direct else path.with_name(f".{path.name}.partial-{os.getpid()}")
+            direct = os.path.exists(path) and not (os.path.isfile(path) and os.access(folder, os.W_OK))
+            partial = path if direct else os.path.join(folder, f".{base}.partial-{os.getpid()}")
             file: BinaryIO = stack.enter_context(open(partial, "wb"))
             if not direct:
-                stack.callback(partial.unlink, missing_ok=True)
+                stack.callback(_remove, partial)
             if suffix:
                 with _packing_into(file, suffix) as packed:
                     yield packed
@@ -100,7 +96,7 @@ class Streams:
                 yield file
             file.close()
             if not direct:
-                partial.replace(path)
+                os.replace(partial, path)
 
     def write(self, name: str, text: str) -> None:
         """Write a file whole, as `output` does."""
@@ -121,8 +117,7 @@ class Streams:
 class Lines:
     """Iterates over the lines of a file that are neither blank nor comments; `number` is that of the last line read.
 
-    A line is read when it is asked for. `data` is the whole file, and `blocks` are its parts, for those who take it
-    apart themselves.
+    A line is read when it is asked for. `blocks` are the file's parts, for those who take it apart themselves.
     """
 
     def __init__(self, name: str, source: BinaryIO, streams: Streams) -> None:
@@ -130,12 +125,6 @@ class Lines:
         self.number = 0
         self.source = source
         self.streams = streams
-
-    @cached_property
-    def data(self) -> bytes:
-        """All bytes, without a byte-order mark."""
-        with _named(self.name), self.streams.closing(self.source):
-            return self._unmarked(self.source.read())
 
     def _unmarked(self, start: bytes) -> bytes:
         encoding = _OTHER_MARKS.get(start[:2])
@@ -145,9 +134,6 @@ class Lines:
         return start.removeprefix(_BYTE_ORDER_MARK)
 
     def _physical(self) -> Iterator[bytes]:
-        if "data" in self.__dict__:
-            yield from BytesIO(self.data)
-            return
         first = self._unmarked(self.source.readline())
         if first:
             yield first
@@ -206,8 +192,13 @@ def exit_status(tool: _Tool) -> _Tool:
     return cast(_Tool, run)
 
 
-def _path(name: str) -> Path:
-    return Path(os.fsdecode(name.encode("latin-1")))
+def _path(name: str) -> str:
+    return os.fsdecode(name.encode("latin-1"))
+
+
+def _remove(path: str) -> None:
+    with suppress(FileNotFoundError):
+        os.unlink(path)
 
 
 def _packing(name: str) -> str:
@@ -227,12 +218,12 @@ def _named(name: str) -> Iterator[None]:
         raise SrilmError(f"{name}: {getattr(error, 'strerror', None) or error}") from error
 
 
-def _is_packed(path: Path, suffix: str) -> bool:
+def _is_packed(path: str, suffix: str) -> bool:
     with open(path, "rb") as file:
         return file.read(len(_PACKERS[suffix])) == _PACKERS[suffix]
 
 
-def _unpacking(path: Path, suffix: str) -> BinaryIO:
+def _unpacking(path: str, suffix: str) -> BinaryIO:
     from bz2 import BZ2File
     from gzip import GzipFile
 

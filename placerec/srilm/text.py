@@ -9,9 +9,9 @@ import numpy as np
 
 from placerec.lm.ahead import work_ahead
 from placerec.lm.counts import NgramCounts, count_text
+from placerec.lm.logs import Ints
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.stored_text import BLOCK, Numbers, StoredText
-from placerec.lm.trie import Ints
 from placerec.srilm.counts_file import parse_count
 from placerec.srilm.fields import unusual
 from placerec.srilm.numbering import Numbering, cut_words

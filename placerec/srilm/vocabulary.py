@@ -1,16 +1,17 @@
 """SRILM's vocabulary: words by number in order of first occurrence; section 3 of our SRILM specification."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
-from placerec.lm.trie import Vocabulary
 from placerec.srilm.streams import Streams, tokens
+
+if TYPE_CHECKING:
+    from placerec.lm.trie import Vocabulary
 
 PAUSE = "-pau-"
 
 
-@dataclass
 class WordList:
     """Names and their numbers; several names may have one number (aliases), a number may have lost its name.
 
@@ -18,19 +19,14 @@ class WordList:
     (-unk). `meta_tag`: words with this start are counts of counts.
     """
 
-    lower: bool = False
-    closed: bool = False
-    open_unknown: bool = False
-    meta_tag: str | None = None
-    unknown: str = UNKNOWN
-    index: dict[str, int] = field(default_factory=dict)
-    words: list[str | None] = field(default_factory=list)
-    silent: set[str] = field(default_factory=set)
-
-    def __post_init__(self) -> None:
+    def __init__(self, *, lower: bool = False, open_unknown: bool = False, meta_tag: str | None = None) -> None:
+        self.lower, self.closed, self.open_unknown, self.meta_tag = lower, False, open_unknown, meta_tag
+        self.unknown = UNKNOWN
+        self.index: dict[str, int] = {}
+        self.words: list[str | None] = []
         for word in (UNKNOWN, SENTENCE_START, SENTENCE_END, PAUSE):
             self.add(word)
-        self.silent |= {SENTENCE_START, PAUSE}
+        self.silent = {SENTENCE_START, PAUSE}
 
     def normal(self, word: str) -> str:
         """`word` in lower case (A to Z only) if that was asked for."""
@@ -81,13 +77,15 @@ class WordList:
             self.words[former] = None
         self.index[name] = number
 
-    def names(self, vocabulary: Vocabulary) -> list[int]:
+    def names(self, vocabulary: "Vocabulary") -> list[int]:
         """How many names each word of the sorted vocabulary has."""
         count = Counter(self.index.values())
         return [count[self.index[word]] for word in vocabulary.words]
 
-    def sorted(self) -> tuple[Vocabulary, list[int]]:
+    def sorted(self) -> "tuple[Vocabulary, list[int]]":
         """The vocabulary of the language-model room, and the number there of each number here (-1: lost)."""
+        from placerec.lm.trie import Vocabulary
+
         vocabulary = Vocabulary.of(word for word in self.words if word is not None)
         return vocabulary, [-1 if word is None else vocabulary.index[word] for word in self.words]
 

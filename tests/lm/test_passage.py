@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
 from placerec.lm.draft import Draft, drafts_of
 from placerec.lm.gather import trie_of
+from placerec.lm.logs import Ints
 from placerec.lm.passage import (
     Passage,
     answers,
@@ -20,7 +21,7 @@ from placerec.lm.passage import (
     used_context,
 )
 from placerec.lm.row_index import RowIndex
-from placerec.lm.trie import Ints, Vocabulary, build_trie, endings
+from placerec.lm.trie import Vocabulary, build_trie, endings
 
 texts = st.lists(st.lists(st.sampled_from("abcd"), min_size=1, max_size=8), min_size=1, max_size=5)
 
@@ -91,14 +92,32 @@ def test_joint_probabilities_of_recent_words() -> None:
     assert of_rows[rows[0]] == pytest.approx(model.log10_p("a") + model.log10_p("b", ["a"]))
 
 
+whole_numbers = st.integers(0, 9) | st.integers(-(2**63), 2**63 - 1)
+
+
 @settings(max_examples=50, deadline=None)
-@given(st.sets(st.integers(0, 2**62), max_size=300), st.lists(st.integers(0, 2**62), max_size=50))
-def test_an_index_finds_what_is_there_and_nothing_else(keys: set[int], others: list[int]) -> None:
-    listed = np.array(sorted(keys), np.int64)
-    index = RowIndex(listed)
-    assert index.find(listed).tolist() == list(range(len(listed)))
-    places = {key: place for place, key in enumerate(listed.tolist())}
-    assert index.find(np.array(others, np.int64)).tolist() == [places.get(key, -1) for key in others]
+@given(st.lists(whole_numbers, max_size=300), st.lists(whole_numbers, max_size=50))
+def test_an_index_finds_what_is_there_and_nothing_else(keys: list[int], others: list[int]) -> None:
+    index = RowIndex(np.array(keys, np.int64))
+    assert [keys[place] for place in index.find(np.array(keys, np.int64)).tolist()] == keys
+    found = index.find(np.array(others, np.int64)).tolist()
+    assert all(keys[place] == key if key in keys else place == -1 for key, place in zip(others, found, strict=True))
+    assert index.distinct == (len(set(keys)) == len(keys))
+
+
+def test_an_index_of_many_numbers_finds_each() -> None:
+    keys = np.random.default_rng(0).permutation(100_000) * 7919
+    index = RowIndex(keys)
+    assert index.distinct
+    np.testing.assert_array_equal(index.find(keys), np.arange(len(keys)))
+    assert (index.find(keys + 1) == -1).all()
+    assert not RowIndex(np.append(keys, keys[:1])).distinct
+
+
+def test_an_index_of_one_number_many_times_finds_it() -> None:
+    index = RowIndex(np.full(5000, 7))
+    assert not index.distinct
+    assert index.find(np.array([7, 8])).tolist() in [[place, -1] for place in range(5000)]
 
 
 @settings(max_examples=50, deadline=None)

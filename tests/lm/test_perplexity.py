@@ -1,5 +1,7 @@
 """Totals and ranks of scored text, by hand."""
 
+from functools import reduce
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,7 @@ def test_sentences_sum_up_to_the_text() -> None:
     scored, lengths = np.arange(5) != 2, np.array([2, 0, 3])
     rows = tally_sentences(log10_p, np.zeros(5, bool), scored, lengths, np.array([True, False, True]))
     assert rows.tolist() == [[1, 1, 0, 0, -3], [0, 0, 0, 0, 0], [1, 1, 0, 1, -4]]
-    total = sum((Totals(*row) for row in rows.tolist()), Totals())
+    total = reduce(Totals.plus, (Totals(*row) for row in rows.tolist()))
     assert total == Totals(2, 2, 0, 1, -7)
     assert total.times(2) == Totals(4, 4, 0, 2, -14)
 
@@ -55,7 +57,7 @@ def test_ranks_tell_words_from_sentence_ends() -> None:
     assert word.absolute == pytest.approx(1)
     end = rank_word(float(everyone[2]), everyone, known=True, end=True)
     assert (end.words, end.tokens, end.leading, end.leading_words) == (0, 1, (0, 1, 1), (0, 0, 0))
-    assert (word + end).square == pytest.approx(2 * 0.25 + 0.64)
+    assert word.plus(end).square == pytest.approx(2 * 0.25 + 0.64)
 
 
 def test_an_unknown_word_costs_nothing_and_a_known_one_everything() -> None:

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
 from placerec.lm.checks import context_sums
 from placerec.lm.draft import drafts_of, reweigh
+from placerec.lm.logs import Ints
 from placerec.lm.prune import prune, prune_improbable, pruned
 from placerec.lm.trace import SILENT, Trace
-from placerec.lm.trie import Ints
 
 SILENT_WORDS = ["<s>", "<unk>"]
 texts = st.lists(st.lists(st.sampled_from("abcd"), min_size=1, max_size=10), min_size=1, max_size=6)

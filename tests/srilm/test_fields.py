@@ -66,11 +66,13 @@ decimals = st.one_of(
 )
 
 
-@given(st.lists(decimals, min_size=1))
-def test_decimal_numbers_are_rounded_as_python_rounds_them(texts: list[str]) -> None:
+@given(st.lists(decimals, min_size=1), st.sampled_from([0, arpa_block._FEW]))
+def test_decimal_numbers_are_rounded_as_python_rounds_them(texts: list[str], few: int) -> None:
     data = "".join(f"{text}\n" for text in texts).encode()
     fields, _ = split_lines(data + PADDING, len(data))
-    values = arpa_block._numbers(fields, np.arange(len(texts)), most=0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(arpa_block, "_FEW", few)
+        values = arpa_block._numbers(fields, np.arange(len(texts)), most=0.0)
     assert values is not None
     expected = np.array([float(text) for text in texts]).astype(np.float32)
     np.testing.assert_array_equal(values, np.where(expected == -99, -np.inf, expected))

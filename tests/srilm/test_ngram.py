@@ -8,7 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
+from placerec.srilm import sentences
 from placerec.srilm.ngram import ngram
 from placerec.srilm.streams import Streams
 
@@ -185,6 +188,17 @@ def test_dynamic_mixtures_cannot_be_written(run: Run) -> None:
     assert (status, err) == (0, "write() method not implemented\nerror writing y.lm\n")
     assert out == run("-lm m.lm -ppl t", t="a\n")[1]
     assert Path("y.lm").read_bytes() == b""
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.text("ab# \n\0\v", max_size=60), st.integers(1, 20))
+def test_a_text_is_scored_alike_in_blocks_of_any_size(run: Run, text: str, size: int) -> None:
+    whole = run("-lm m.lm -order 2 -ppl t", t=text)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sentences, "_BLOCK", size)
+        assert run("-lm m.lm -order 2 -ppl t", t=text) == whole
+    # At debug level 1 every line is read by itself.
+    assert run("-lm m.lm -order 2 -ppl t -debug 1", t=text)[1].endswith(whole[1])
 
 
 def test_a_cache_runs_across_sentences(run: Run) -> None:

@@ -78,7 +78,8 @@ def test_values_that_are_no_numbers_leave_the_default(arguments: list[str], mess
 
 
 def test_negative_values_are_fine_where_a_number_may_be_negative() -> None:
-    assert parsed(["-debug", "-1"]) == (Parsed({**parsed([])[0].values, "debug": -1}, {"debug"}), "")
+    values, said = parsed(["-debug", "-1"])
+    assert (values["debug"], values.given, values.rest, said) == (-1, {"debug"}, [], "")
 
 
 @pytest.mark.parametrize(

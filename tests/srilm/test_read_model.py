@@ -204,6 +204,25 @@ def test_whole_blocks_are_read_as_line_by_line(tmp_path_factory: pytest.TempPath
 
 
 @settings(max_examples=100, deadline=None)
+@given(models(), st.integers(1, 60), st.none() | st.tuples(st.sampled_from("\0\v\n"), st.integers(0, 200)))
+def test_the_size_of_blocks_changes_nothing(
+    tmp_path_factory: pytest.TempPathFactory, text: str, size: int, odd: tuple[str, int] | None
+) -> None:
+    if odd is not None:
+        text = text[: odd[1]] + odd[0] + text[odd[1] :]
+    folder, seen = tmp_path_factory.mktemp("models"), []
+    for block in (size, arpa_reader._BLOCK):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(arpa_reader, "_BLOCK", block)
+            try:
+                draft, _, said = read(text, folder)
+                seen.append((format_draft(draft), said))
+            except SrilmError as error:
+                seen.append((str(error), []))
+    assert seen[0] == seen[1]
+
+
+@settings(max_examples=100, deadline=None)
 @given(models(), st.lists(st.lists(names, max_size=6), max_size=4), st.integers(1, 4))
 def test_a_model_read_for_scoring_gives_the_same_answers(
     tmp_path_factory: pytest.TempPathFactory, text: str, sentences: list[list[str]], order: int

@@ -21,9 +21,10 @@ def streams(data: bytes = b"") -> tuple[Streams, io.BytesIO, io.BytesIO]:
 def lines_of(data: bytes) -> list[tuple[int, str]]:
     lines = Lines("x", io.BytesIO(data), streams()[0])
     found = [(lines.number, line) for line in lines]
-    whole = Lines("x", io.BytesIO(data), streams()[0])
-    assert whole.data == data.removeprefix(b"\xef\xbb\xbf")
-    assert [(whole.number, line) for line in whole] == found
+    parts = Lines("x", io.BytesIO(data), streams()[0])
+    blocks = list(parts.blocks(3))
+    assert b"".join(blocks) == data.removeprefix(b"\xef\xbb\xbf")
+    assert [(parts.number, line) for line in parts.of(line for block in blocks for line in io.BytesIO(block))] == found
     return found
 
 
