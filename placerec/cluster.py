@@ -102,14 +102,12 @@ def _local(distributed: Any, workers: int) -> Iterator[str]:
     import dask
 
     with TemporaryDirectory(prefix="placerec-") as folder, dask.config.set({"temporary-directory": folder}):
-        with _uninterrupted():
-            made = distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=None,
-                silence_logs=logging.CRITICAL,
-            )
+        options = {"threads_per_worker": 1, "processes": True, "dashboard_address": None}
+        try:
+            with _uninterrupted():
+                made = distributed.LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)
+        except (OSError, RuntimeError) as error:
+            raise JobError(f"local:{workers}: the processes cannot be started ({error}); try fewer") from error
         with made:
             yield made.scheduler_address
 
@@ -131,6 +129,8 @@ def _uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def _client(distributed: Any, address: str) -> Iterator[Any]:
+    if address.startswith("tls:") and not distributed.Security().get_connection_args("client")["ssl_context"]:
+        raise JobError(f"{address}: needs certificates; name them in Dask's configuration, under distributed.comm.tls")
     try:
         client = distributed.Client(address, timeout=CONNECT, set_as_default=False, direct_to_workers=False)
     except (OSError, ValueError) as error:
@@ -148,6 +148,8 @@ def _check_workers(client: Any, address: str) -> None:
         raise JobError(f"{address}: the scheduler has no workers; start some with `dask worker {address}`") from error
     here, others = _versions(), {}
     for worker, there in client.run(_versions, on_error="return").items():
+        if isinstance(there, OSError):
+            continue  # lost meanwhile
         if isinstance(there, Exception):
             raise JobError(f"{worker}: cannot import placerec; install placerec {__version__} there") from there
         if there["placerec"] != __version__:
@@ -205,7 +207,7 @@ class _Dask:
 
     def keep(self, items: Listed[T], /) -> Each[T]:
         """Maps functions over items that lie with the workers; `items` gives them again when a worker is lost."""
-        size = max(1, min(KEPT, len(items) // (4 * self._threads())))
+        size = max(1, min(KEPT, len(items) // (4 * max(1, self._threads()))))
         groups = [range(first, min(first + size, len(items))) for first in range(0, len(items), size)]
         places: list[Any] = [None] * len(groups)
 
@@ -272,6 +274,8 @@ class _Dask:
             try:
                 return future.result(timeout=JOIN / 6)
             except TimeoutError as error:
+                if future.status == "error":
+                    raise  # the function's own
                 if future.done() or self._threads():
                     since = monotonic()
                 elif monotonic() - since > JOIN:

@@ -115,6 +115,10 @@ def refuse(number: int) -> int:
     raise StreamError(f"{number} cannot be used; take another")
 
 
+def be_late(number: int) -> int:
+    raise TimeoutError("the file system is slow today")
+
+
 def total(rows: Any) -> float:
     return float(rows.sum())
 
@@ -131,6 +135,8 @@ def test_results_and_notes_are_in_order_and_errors_come_through(
         assert list(work(partial(np.vdot, large), [large])) == [0.0]
         with pytest.raises(StreamError, match="3 cannot be used; take another"):
             list(work(refuse, [3, 4]))
+        with pytest.raises(TimeoutError, match="the file system is slow today"):
+            list(work(be_late, [3, 4]))
         assert next(work(double, iter(range(10**9)))) == 0
 
 
@@ -257,6 +263,11 @@ def test_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
         pass
 
 
+def test_no_certificates() -> None:
+    with pytest.raises(JobError, match="needs certificates; name them"), cluster("tls://127.0.0.1:9"):
+        pass
+
+
 def test_another_version(machines: Machines, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     address = machines.have(1)
     with monkeypatch.context() as patched, caplog.at_level(logging.WARNING, "placerec"):
@@ -288,6 +299,8 @@ def test_all_workers_and_the_scheduler_are_lost(tmp_path: Path, monkeypatch: pyt
             machines.kill()
             with pytest.raises(JobError, match="no worker is left; start more with `dask worker tcp://"):
                 list(results)
+            with pytest.raises(JobError, match="the scheduler has no workers; start some"), cluster(address):
+                pass
             results = work(started, items)
             machines.scheduler.kill()
             with pytest.raises(JobError, match="the scheduler is gone; start it again"):
