@@ -9,13 +9,15 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from placerec.errors import PlacerecError
 
 T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 R = TypeVar("R")
 Progress = Callable[[int, int], None]
 log = logging.getLogger("placerec")
@@ -32,6 +34,42 @@ class Map(Protocol):
     """Like the built-in `map` of one iterable: lazy, the results in the order of the items."""
 
     def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]: ...
+
+
+class Listed(Protocol[T_co]):
+    """Items by number: a sequence, as far as a cluster needs it."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, at: int, /) -> T_co: ...
+
+
+class Each(Protocol[T_co]):
+    """A map of one function after the other over the same items."""
+
+    def __call__(self, function: Callable[[T_co], R], /) -> Iterator[R]: ...
+
+
+@runtime_checkable
+class Far(Map, Protocol):
+    """A map of workers on other machines (`cluster.cluster`), which can keep items for several functions."""
+
+    def keep(self, items: Listed[T], /) -> Each[T]: ...
+
+
+def far(work: Map | None) -> Map:
+    """`work` if it is of other machines, else the built-in map.
+
+    For arithmetic on large arrays, which the processors of this machine share already.
+    """
+    return work if isinstance(work, Far) else map
+
+
+def each_of(items: Listed[T], work: Map | None) -> Each[T]:
+    """Maps functions over the items as `far` would; other machines are sent each item once, if there are two."""
+    if isinstance(work, Far) and len(items) > 1:
+        return work.keep(items)
+    return lambda function: map(function, map(items.__getitem__, range(len(items))))
 
 
 def processors() -> int:
@@ -79,10 +117,8 @@ def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few
     call = partial(_call, log.getEffectiveLevel())
     with _Workers(jobs, function) as pool:
         try:
-            for result, records in _ahead(pool, partial(_submit, pool, call), chain(first, rest), 4 * jobs):
-                for record in records:
-                    log.handle(record)
-                yield result
+            for answer in _ahead(pool, partial(_submit, pool, call), chain(first, rest), 4 * jobs):
+                yield answer.told()
         except BrokenProcessPool as error:
             raise JobError("a process of the work was killed; give it more memory, or fewer jobs") from error
 
@@ -140,24 +176,44 @@ def _end_after(wait: Callable[[], None]) -> None:
 
 
 class _Notes(logging.Handler):
-    """Keeps what is logged, ready to be sent to another process."""
+    """Keeps what this thread logs, ready to be sent to another process."""
 
     def __init__(self) -> None:
         super().__init__()
         self.records: list[logging.LogRecord] = []
+        self._thread = threading.get_ident()
 
     def emit(self, record: logging.LogRecord) -> None:
-        record.msg, record.args = record.getMessage(), None
-        self.records.append(record)
+        if record.thread == self._thread:
+            record.msg, record.args = record.getMessage(), None
+            self.records.append(record)
 
 
-def _call(level: int, item: Any) -> tuple[Any, list[logging.LogRecord]]:
-    """In a worker: its function of the item, and what that logged."""
+@dataclass(frozen=True)
+class Noted(Generic[R]):
+    """A result from another process, and what was logged there."""
+
+    result: R
+    records: list[logging.LogRecord]
+
+    def told(self) -> R:
+        """The result, once what was logged there is logged here."""
+        for record in self.records:
+            log.handle(record)
+        return self.result
+
+
+def noted(function: Callable[[T], R], item: T, level: int) -> Noted[R]:
+    """In another process: `function` of the item, and what it logs at `level` and above."""
     notes = _Notes()
     log.setLevel(level)
     log.propagate = False
     log.addHandler(notes)
     try:
-        return _function(item), notes.records
+        return Noted(function(item), notes.records)
     finally:
         log.removeHandler(notes)
+
+
+def _call(level: int, item: Any) -> Noted[Any]:
+    return noted(_function, item, level)

@@ -13,7 +13,7 @@ PACKAGE = Path(placerec.__file__).parent
 HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm", "sklearn")
 # A room imports only from rooms to its left, and these anyone may import.
 LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "experiments", "demo", "cli")
-COMMON = {"errors", "files", "jobs", "journal", "version"}
+COMMON = {"cluster", "errors", "files", "jobs", "journal", "version"}
 ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     # A toolkit for text alone.
     "lm": COMMON | {"lm"},
@@ -25,6 +25,7 @@ ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     "files": {"errors"},
     "jobs": {"errors"},
     "journal": {"errors", "files", "jobs"},
+    "cluster": {"errors", "jobs", "version"},
     "errors": set(),
     "version": set(),
     "reference": set(),
@@ -96,7 +97,9 @@ def test_rooms_know_only_rooms_to_their_left(path: Path) -> None:
         if module.split(".")[0] == "placerec":
             other = [*module.split("."), ""][1]
             assert other in ALLOWED[room], f"{path}:{line}: {room} imports {module}"
-        assert module.split(".")[0] != "click" or room == "cli", f"{path}:{line}: only cli/ knows click"
+        foreign = module.split(".")[0]
+        assert foreign not in ("dask", "distributed") or room == "cluster", f"{path}:{line}: everyone is handed a map"
+        assert foreign != "click" or room == "cli", f"{path}:{line}: only cli/ knows click"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))

@@ -9,12 +9,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 from placerec.errors import PlacerecError
+
+if TYPE_CHECKING:
+    from placerec.jobs import Map
 
 Command = Callable[..., Any]
 log = logging.getLogger("placerec")
@@ -131,15 +134,59 @@ def jobs_option(function: Command) -> Command:
     return click.option("-j", "--jobs", metavar="N", type=click.IntRange(min=1), help=text)(function)
 
 
+def _cluster_address(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    if value is not None:
+        from placerec.cluster import check_address
+
+        with usage("--cluster"):
+            check_address(value)
+    return value
+
+
+_CLUSTER = click.option(
+    "--cluster",
+    metavar="ADDRESS|local:N",
+    callback=_cluster_address,
+    help="Let a Dask cluster do the work: its scheduler's address, or N processes here; the output is the same.",
+)
+
+
+@contextmanager
+def _cluster(address: str | None) -> Iterator["Map | None"]:
+    if address is None:
+        yield None
+        return
+    from placerec.cluster import cluster
+
+    with cluster(address) as work:
+        yield work
+
+
+def cluster_option(function: Command) -> Command:
+    """--cluster: other machines that take a share. The command gets `work`, None without."""
+
+    @_CLUSTER
+    @functools.wraps(function)
+    def working(*args: Any, cluster: str | None, **options: Any) -> Any:
+        with _cluster(cluster) as work:
+            return function(*args, work=work, **options)
+
+    return working
+
+
 def work_options(function: Command) -> Command:
-    """--jobs: what does the work. The command gets `work`."""
+    """--jobs, --cluster: who does the work. The command gets `work`."""
 
     @jobs_option
+    @_CLUSTER
     @functools.wraps(function)
-    def working(*args: Any, jobs: int | None, **options: Any) -> Any:
+    def working(*args: Any, jobs: int | None, cluster: str | None, **options: Any) -> Any:
         from placerec.jobs import processors, workers
 
-        return function(*args, work=workers(jobs or processors()), **options)
+        if jobs and cluster:
+            raise click.UsageError("--jobs is of this machine, and --cluster of others; leave one of them out")
+        with _cluster(cluster) as work:
+            return function(*args, work=work or workers(jobs or processors()), **options)
 
     return working
 

@@ -1,10 +1,14 @@
 """`placerec train-lm`."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from placerec.cli.options import PATH, FiniteRange, output_option, progress_bar, talk_options, usage
+from placerec.cli.options import PATH, FiniteRange, cluster_option, output_option, progress_bar, talk_options, usage
+
+if TYPE_CHECKING:
+    from placerec.jobs import Map
 
 # The names of placerec.lm.SMOOTHINGS, written out: importing it would make --help wait for numpy.
 SMOOTHING_NAMES = tuple(
@@ -57,6 +61,7 @@ SMOOTHING_NAMES = tuple(
     help="All words, one a line.  [default: vocab.txt beside TOKENS]",
 )
 @output_option("MODEL/", "The folder to write: one ARPA file per place, and what made it.")
+@cluster_option
 @talk_options
 def train_lm(
     tokens: tuple[Path, ...],
@@ -68,6 +73,7 @@ def train_lm(
     markers: bool,
     vocab: Path | None,
     out: Path,
+    work: "Map | None",
 ) -> None:
     """Train one n-gram model per place, as ARPA files.
 
@@ -83,4 +89,4 @@ def train_lm(
         selection = parse_selection(select)
     options = Options(order, smoothing, delta, minima, markers, selection)
     with progress_bar("train-lm") as progress:
-        run(tokens, out, options=options, vocabulary=vocab, progress=progress)
+        run(tokens, out, options=options, vocabulary=vocab, work=work, progress=progress)

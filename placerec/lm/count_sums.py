@@ -1,13 +1,76 @@
-"""Counts files read back, and counts taken away from counts: what learning and forgetting a few sentences needs."""
+"""Sums of counts: of pieces that were counted elsewhere, and of counts files, which are added to and taken from."""
 
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text
-from placerec.lm.counts import NgramCounts, tabulate
+from placerec.jobs import Map
+from placerec.lm.counts import NgramCounts, add_counts, count_text, numbered, tabulate
+from placerec.lm.logs import Ints
+from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.stored_text import Numbers, StoredText
 from placerec.lm.trie import Vocabulary
+
+# A piece of a text, by the text's number: word numbers (T,) and lengths of sentences (S,).
+Piece = tuple[int, Numbers, Ints]
+# Its counts, by the text's number: per order the n-grams (m, n) and how often each occurs (m,).
+Counted = tuple[int, list[Ints], list[Numbers]]
+
+
+def count_texts(
+    texts: Iterable[Iterable[Sequence[str]]],
+    order: int,
+    *,
+    vocabulary: Iterable[str],
+    markers: bool = True,
+    work: Map = map,
+) -> Iterator[NgramCounts]:
+    """`count_ngrams` of every text, in order, with a closed vocabulary; `work` counts the pieces, which are added here.
+
+    Beside the pieces that are under way, memory holds a few times the n-grams of one text.
+    """
+    ordered = Vocabulary.of((UNKNOWN, SENTENCE_START, SENTENCE_END, *vocabulary))
+    unknown = ordered.index[UNKNOWN]
+    narrow = np.min_scalar_type(len(ordered))  # so that little is sent
+    pieces = (
+        (text, tokens.astype(narrow), lengths)
+        for text, sentences in enumerate(texts)
+        for tokens, lengths in numbered(sentences, lambda word: ordered.index.get(word, unknown), markers)
+    )
+    counted = work(partial(_count_piece, ordered, order), pieces)
+    for _, parts in groupby(counted, key=itemgetter(0)):
+        yield _sum(tabulate(ordered, order, ngrams, counts) for _, ngrams, counts in parts)
+
+
+def _count_piece(vocabulary: Vocabulary, order: int, piece: Piece) -> Counted:
+    number, tokens, lengths = piece
+    text = StoredText()
+    text.add(tokens, lengths)
+    table = count_text(text, order, vocabulary)
+    orders = range(1, order + 1)
+    ngrams = [table.trie.matrix(n)[table.seen[n - 1]] for n in orders]
+    return number, ngrams, [table.counts[n - 1][table.seen[n - 1]] for n in orders]
+
+
+def _sum(tables: Iterator[NgramCounts]) -> NgramCounts:
+    """The sum of counts over one vocabulary; none is added to another often."""
+    total = next(tables)
+    waiting: list[NgramCounts] = []
+    for table in tables:
+        waiting.append(table)
+        if sum(map(_rows, waiting)) > _rows(total):
+            total, waiting = add_counts(total, *waiting), []
+    return add_counts(total, *waiting) if waiting else total
+
+
+def _rows(table: NgramCounts) -> int:
+    return sum(map(len, table.counts))
 
 
 def read_counts(path: Path, vocabulary: Vocabulary, order: int) -> NgramCounts:

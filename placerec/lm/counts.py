@@ -1,7 +1,7 @@
 """Counting n-grams: one sort of packed windows gives the counts of all orders (any order, any vocabulary)."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import cast
@@ -52,6 +52,16 @@ def count_ngrams(
         numbers[word]
     number = partial(_listed, numbers) if vocabulary is not None else numbers.__getitem__
     text = StoredText()
+    for tokens, lengths in numbered(sentences, number, markers):
+        text.add(tokens, lengths)
+    ordered = Vocabulary.of(numbers)
+    return count_text(text, order, ordered, renumbered=ordered.ids(list(numbers)))
+
+
+def numbered(
+    sentences: Iterable[Sequence[str]], number: Callable[[str], int], markers: bool
+) -> Iterator[tuple[Ints, Ints]]:
+    """Sentences as word numbers (T,) and lengths (S,), in pieces of BLOCK words or a little more; one at least."""
     tokens: list[int] = []
     lengths: list[int] = []
     for sentence in sentences:
@@ -59,11 +69,9 @@ def count_ngrams(
         tokens.extend(map(number, words))
         lengths.append(len(words))
         if len(tokens) >= BLOCK:
-            text.add(np.array(tokens, np.int64), np.array(lengths, np.int64))
+            yield np.array(tokens, np.int64), np.array(lengths, np.int64)
             tokens, lengths = [], []
-    text.add(np.array(tokens, np.int64), np.array(lengths, np.int64))
-    ordered = Vocabulary.of(numbers)
-    return count_text(text, order, ordered, renumbered=ordered.ids(list(numbers)))
+    yield np.array(tokens, np.int64), np.array(lengths, np.int64)
 
 
 def _listed(numbers: Mapping[str, int], word: str) -> int:

@@ -10,7 +10,7 @@ MODEL/nonevents.txt          without markers: what the `ngram-count` commands ne
 
 import json
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from placerec.errors import LanguageModelError, ModelError
 from placerec.files import whole_folder, write_text
 from placerec.frames.places import check_place, check_twins
+from placerec.jobs import Map
 from placerec.lm import (
     BackoffModel,
     NgramCounts,
@@ -28,6 +29,7 @@ from placerec.lm import (
     with_unigrams,
     write_arpa,
 )
+from placerec.lm.count_sums import count_texts
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
 from placerec.model.corpus import VOCABULARY, gather_corpus
@@ -98,11 +100,13 @@ def train_lm(
     *,
     options: Options = Options(),
     vocabulary: Path | str | None = None,
+    work: Map | None = None,
     progress: Progress | None = None,
 ) -> None:
     """`placerec train-lm`: read token streams or sentences (see `gather_corpus`) and write a MODEL/ folder.
 
-    Memory holds the model of one place and one stream; the sentences go to their files as they are read.
+    Memory holds the model of one place and one stream; the sentences go to their files as they are read. `work`: as for
+    `train_model`.
     """
     check_options(options)
     with whole_folder(Path(out), OWNED) as folder:
@@ -116,7 +120,7 @@ def train_lm(
         if not record.places:
             raise ModelError(NO_PLACE)
         texts = {place: each_sentence(PlaceFiles.of(folder, place).sentences) for place in record.places}
-        _write_model(folder, texts, words, options, record, progress)
+        _write_model(folder, texts, words, options, record, work, progress)
     log.info("%s: %d places, order %d, %s", out, len(texts), options.order, options.smoothing)
 
 
@@ -127,18 +131,20 @@ def train_model(
     *,
     options: Options = Options(),
     record: Record = NO_RECORD,
+    work: Map | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Train one language model per place and write the MODEL/ folder `out`, whole or not at all.
 
-    `record`: what model.json keeps of the training sequences. Raises ModelError for no place, a bad name of a place,
-    a word that the vocabulary lacks or a bad option.
+    `record`: what model.json keeps of the training sequences. `work`: who counts (`cluster.cluster`), None for this
+    process; the bytes are the same with any. Raises ModelError for no place, a bad name of a place, a word that the
+    vocabulary lacks or a bad option.
     """
     _check(sentences, vocabulary, options)
     with whole_folder(Path(out), OWNED) as folder:
         for place, text in sentences.items():
             write_text(PlaceFiles.of(folder, place).sentences, format_sentences(text))
-        _write_model(folder, sentences, vocabulary, options, record, progress)
+        _write_model(folder, sentences, vocabulary, options, record, work, progress)
 
 
 def _write_model(
@@ -147,16 +153,26 @@ def _write_model(
     vocabulary: Sequence[str],
     options: Options,
     record: Record,
+    work: Map | None,
     progress: Progress | None,
 ) -> None:
     """What MODEL/ holds beside the files of sentences, which are there."""
     begin_model(folder, vocabulary, options)
-    for done, (place, text) in enumerate(sentences.items(), start=1):
-        counts = count_ngrams(text, options.order, vocabulary=vocabulary, markers=options.markers)
+    tables = _counted(sentences.values(), vocabulary, options, work)
+    for done, (place, counts) in enumerate(zip(sentences, tables, strict=True), start=1):
         write_place(folder, place, counts, vocabulary, options)
         if progress:
             progress(done, len(sentences))
     write_model_json(folder, list(sentences), vocabulary, options, record)
+
+
+def _counted(
+    texts: Iterable[Iterable[Sequence[str]]], vocabulary: Sequence[str], options: Options, work: Map | None
+) -> Iterator[NgramCounts]:
+    order, markers = options.order, options.markers
+    if work is not None:
+        return count_texts(texts, order, vocabulary=vocabulary, markers=markers, work=work)
+    return (count_ngrams(text, order, vocabulary=vocabulary, markers=markers) for text in texts)
 
 
 def begin_model(folder: Path, vocabulary: Sequence[str], options: Options) -> None:

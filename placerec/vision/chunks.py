@@ -3,11 +3,13 @@
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError
+from placerec.jobs import Each, Map, each_of
 from placerec.vision.exact import TERMS
 
 Rows = NDArray[np.float32]
@@ -38,28 +40,45 @@ def chunks(source: Source) -> Iterator[Rows]:
         yield np.concatenate(waiting)
 
 
-@contextmanager
-def stored(source: Source) -> Iterator[Stream]:
-    """The rows of a source, kept for any number of passes: in memory up to IN_MEMORY, beyond in a nameless file."""
-    width = 0
-    with tempfile.SpooledTemporaryFile(IN_MEMORY) as file:
+class Stored:
+    """The chunks of a source, kept for any number of passes; as a stream, too.
+
+    `each` maps functions over them; workers on other machines have copies of their own.
+    """
+
+    def __init__(self, file: IO[bytes], source: Source, work: Map | None) -> None:
+        self._file = file
+        self._count, self._width = 0, 0
         for rows in chunks(source):
             file.write(rows.astype(np.float32, copy=False).tobytes())
-            width = rows.shape[1]
+            self._count, self._width = self._count + 1, rows.shape[1]
+        self.each: Each[Rows] = each_of(self, work)
 
-        def pieces() -> Iterator[Rows]:
-            file.seek(0)
-            while data := file.read(4 * width * CHUNK):
-                yield np.frombuffer(data, np.float32).reshape(-1, width)
+    def __len__(self) -> int:
+        return self._count
 
-        yield pieces
+    def __getitem__(self, at: int) -> Rows:
+        size = 4 * self._width * CHUNK
+        self._file.seek(at * size)
+        return np.frombuffer(self._file.read(size), np.float32).reshape(-1, self._width)
+
+    def __call__(self) -> Iterator[Rows]:
+        return map(self.__getitem__, range(len(self)))
 
 
-def again(source: Source, n: int) -> Iterator[Rows]:
-    """The chunks of a source that gave n rows before; VisionError if it does not do so again."""
-    count = 0
-    for rows in chunks(source):
-        yield rows
-        count += len(rows)
+@contextmanager
+def stored(source: Source, work: Map | None = None) -> Iterator[Stored]:
+    """The rows of a source for many passes: in memory up to IN_MEMORY, beyond in a nameless file."""
+    with tempfile.SpooledTemporaryFile(IN_MEMORY) as file:
+        yield Stored(file, source, work)
+
+
+def each_chunk(source: Source) -> Each[Rows]:
+    """Maps functions over the chunks of a source: one function for every pass."""
+    return source.each if isinstance(source, Stored) else lambda function: map(function, chunks(source))
+
+
+def check_again(count: int, n: int) -> None:
+    """VisionError if a source that gave n rows before gave `count` now."""
     if count != n:
         raise VisionError(f"the descriptors are {count} rows now and were {n} before; give the same at every call")

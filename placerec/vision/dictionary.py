@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.frames.sequence import Gray
+from placerec.jobs import Map
 from placerec.version import __version__
 from placerec.vision.chunks import CHUNK, Rows, Source, chunks, stored
 from placerec.vision.describe import Descriptors
@@ -112,6 +113,7 @@ class Dictionary:
         rule: str = "batch",
         width: float = WIDTH,
         progress: Progress | None = None,
+        work: Map | None = None,
     ) -> "Dictionary":
         """Learn size x size words from descriptors (n, spec.length) in time order (readings A25-A29).
 
@@ -120,7 +122,8 @@ class Dictionary:
         `fraction`: the share of the frames, drawn by the seed, that PCA and map see. `units`: answer with those
         that at least one training frame hit (`live`: no language model can know the others), or with `all`.
         `rule`, `width`, `epochs`: how the map learns, see `train_som`. `progress`: called with epoch, epochs and
-        quantisation error. Same descriptors, options and seed: same bytes.
+        quantisation error. `work`: whose other machines, if any, take a share of the sums (`cluster.cluster`). Same
+        descriptors, options and seed: same bytes, whoever does the work.
         Raises VisionError for unusable descriptors or options.
         """
         training = Training(size, components, seed, fraction, epochs, units, rule, width)
@@ -130,12 +133,12 @@ class Dictionary:
         if fraction < 1:
             frames = len(source) if isinstance(source, np.ndarray) else sum(map(len, chunks(source)))
             source = _drawn(source, frames, fraction, rng)
-        data = moments(source)
+        data = moments(source, work)
         pca = fit_pca(data, components)
         if data.n < size * size:
             log.warning("%d frames cannot fill the %d words of a map of size %d", data.n, size * size, size)
         # A fifth of the descriptors, for many passes.
-        with stored(projected(source, pca)) as codes:
+        with stored(projected(source, pca), work) as codes:
             som = train_som(codes, size, rng=rng, rule=rule, width=width, epochs=epochs, progress=progress)
             got = map_quality(codes, som.codebook, som.hits)
         errors = got.quantisation_error, got.topographic_error, got.entropy, got.dead

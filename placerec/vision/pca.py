@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError
+from placerec.jobs import Map, far
 from placerec.vision import exact
 from placerec.vision.chunks import CHUNK, Source, Stream, chunks
 
@@ -29,15 +30,19 @@ class Moments:
         """The moments of no rows at all."""
         return cls(0, np.zeros(width), np.zeros((width, width)))
 
-    def updated(self, rows: NDArray[np.float32]) -> "Moments":
-        """The moments with rows (m, d) added, m <= exact.TERMS, by Chan's pairwise formula."""
-        m = len(rows)
+    @classmethod
+    def of(cls, rows: NDArray[np.float32]) -> "Moments":
+        """The moments of rows (m, d), 0 < m <= exact.TERMS."""
         values = rows.astype(np.float64)
-        mean = values.sum(axis=0) / m
-        n = self.n + m
-        step = mean - self.mean
-        between = np.outer(step, step) * (self.n * m / n)
-        return Moments(n, self.mean + step * (m / n), self.scatter + exact.gram(values - mean) + between)
+        mean = values.sum(axis=0) / len(rows)
+        return cls(len(rows), mean, exact.gram(values - mean))
+
+    def plus(self, other: "Moments") -> "Moments":
+        """The moments of these rows and of those of the other, by Chan's pairwise formula."""
+        n = self.n + other.n
+        step = other.mean - self.mean
+        between = np.outer(step, step) * (self.n * other.n / n)
+        return Moments(n, self.mean + step * (other.n / n), self.scatter + other.scatter + between)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +64,14 @@ class Pca:
         return self.components.T.astype(np.float64)
 
 
-def moments(source: Source) -> Moments:
-    """The moments of (n, d) float32 in one pass, from memory, a memory map or a stream; the same however it is cut."""
+def moments(source: Source, work: Map | None = None) -> Moments:
+    """The moments of (n, d) float32 in one pass, from memory, a memory map or a stream; the same however it is cut.
+
+    `work`: other machines, if there are any, take the chunks.
+    """
     total = None
-    for rows in chunks(source):
-        total = (total or Moments.none(rows.shape[1])).updated(rows)
+    for part in far(work)(Moments.of, chunks(source)):
+        total = (total or Moments.none(len(part.mean))).plus(part)
     return total or Moments.none(0)
 
 

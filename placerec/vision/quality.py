@@ -1,12 +1,13 @@
 """How well a map represents frames, those it was trained on or others."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError
-from placerec.vision.chunks import Rows, Source, chunks
+from placerec.vision.chunks import Rows, Source, each_chunk
 from placerec.vision.som import best_units, torn
 
 
@@ -35,11 +36,10 @@ def map_quality(source: Source, codebook: Rows, hits: NDArray[np.int64]) -> MapQ
     """
     falls = np.zeros(len(codebook), np.int64)
     distance, apart = 0.0, 0
-    for rows in chunks(source):
-        units, nearest = best_units(rows, codebook)
-        falls += np.bincount(units, minlength=len(codebook))
-        distance += float(nearest.sum(dtype=np.float64))
-        apart += int(np.count_nonzero(torn(rows, codebook, units)))
+    for its, far, loose in each_chunk(source)(partial(_fall, codebook)):
+        falls += its
+        distance += far
+        apart += loose
     n = int(falls.sum())
     if n == 0:
         raise VisionError("the quality of a map needs at least one descriptor, and there is none; name more images")
@@ -52,3 +52,10 @@ def map_quality(source: Source, codebook: Rows, hits: NDArray[np.int64]) -> MapQ
         int(np.count_nonzero(falls == 0)),
         round(float(falls[hits == 0].sum() / n), 9),
     )
+
+
+def _fall(codebook: Rows, rows: Rows) -> tuple[NDArray[np.int64], float, int]:
+    """How many rows each unit got (K,), the sum of their distances, and how many have their next unit elsewhere."""
+    units, nearest = best_units(rows, codebook)
+    apart = int(np.count_nonzero(torn(rows, codebook, units)))
+    return np.bincount(units, minlength=len(codebook)), float(nearest.sum(dtype=np.float64)), apart

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from placerec.vision.chunks import CHUNK, Rows, Source, again, chunks
+from placerec.vision.chunks import CHUNK, Rows, Source, check_again, chunks, each_chunk
 
 Progress = Callable[[int, int, float], None]  # epoch (from 1), epochs, quantisation error
 
@@ -77,10 +79,37 @@ def train_som(
     codebook = _start(mean, deviation, size, rng)
     learn = {"batch": _batch, "online": _online}[rule]
     codebook, epochs = learn(source, n, codebook, rng, width, epochs, progress)
-    hits, units = np.zeros(size * size, np.int64), Units.of(codebook)
-    for rows in again(source, n):
-        hits += np.bincount(_search(rows, units), minlength=size * size)
+    hits = np.zeros(size * size, np.int64)
+    for its in each_chunk(source)(partial(_hits, Units.of(codebook))):
+        hits += its
+    check_again(int(hits.sum()), n)
     return Som(codebook, hits, epochs)
+
+
+def _hits(units: Units, rows: Rows) -> NDArray[np.int64]:
+    """How many of the rows each unit (K,) is nearest to."""
+    return np.bincount(_search(rows, units), minlength=len(units.places))
+
+
+@dataclass(frozen=True, eq=False)
+class _Share:
+    """What an epoch takes from a chunk of m rows: the unit of each (m,), in the smallest type that holds it.
+
+    sums: float64 (h, k), the sums of the rows of each unit that has some, in the units' order. distance: of all rows
+    to their units.
+    """
+
+    units: NDArray[np.unsignedinteger[Any]]
+    sums: NDArray[np.float64]
+    distance: float
+
+
+def _share(ready: Units, measured: bool, rows: Rows) -> _Share:
+    units = _search(rows, ready)
+    count = len(ready.places)
+    sums = _unit_sums(rows, units, count)[np.bincount(units, minlength=count) > 0]
+    distance = float(distances(rows, ready.places, units).sum()) if measured else 0.0
+    return _Share(units.astype(np.min_scalar_type(count)), sums, distance)
 
 
 def _batch(
@@ -96,20 +125,20 @@ def _batch(
     cooling = (epochs + 1) // 2
     widths = np.geomspace(max(len(codebook) ** 0.5 / 2, width), width, cooling) if cooling > 1 else [width]
     before = np.full(n, -1, np.int32)
+    each = each_chunk(source)
     for epoch in range(1, epochs + 1):
         sums, counts = np.zeros(codebook.shape), np.zeros(len(codebook))
         changed, first, distance = 0, 0, 0.0
-        ready = Units.of(codebook)
-        for rows in again(source, n):
-            units = _search(rows, ready)
-            sums += _unit_sums(rows, units, len(codebook))
-            counts += np.bincount(units, minlength=len(codebook))
-            known = before[first : first + len(rows)]
-            changed += int(np.count_nonzero(units != known))
-            known[:] = units
-            first += len(rows)
-            if progress is not None:
-                distance += float(distances(rows, codebook, units).sum())
+        for share in each(partial(_share, Units.of(codebook), progress is not None)):
+            hit = np.bincount(share.units, minlength=len(codebook))
+            sums[hit > 0] += share.sums
+            counts += hit
+            known = before[first : first + len(share.units)]
+            changed += int(np.count_nonzero(share.units != known))
+            known[:] = share.units
+            first += len(share.units)
+            distance += share.distance
+        check_again(first, n)
         if epoch > cooling and changed < _SETTLED * n:
             return codebook, epoch - 1
         if progress is not None:
@@ -128,7 +157,8 @@ def _online(
     progress: Progress | None,
 ) -> tuple[Rows, int]:
     """Kohonen's rule; the quantisation error that `progress` is told is that of the frames as they were met."""
-    rows = np.concatenate(list(again(source, n)))
+    rows = np.concatenate(list(chunks(source)))
+    check_again(len(rows), n)
     side = round(len(codebook) ** 0.5)
     first, last = max(side / 2, width), width
     place = np.arange(side)
@@ -196,15 +226,20 @@ def torn(codes: Rows, codebook: Rows, nearest: NDArray[np.int64]) -> NDArray[np.
 def _spread(source: Source) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
     """The number of rows, and mean and standard deviation of every column, in one pass (Chan's formula)."""
     n, mean, squares = 0, np.zeros(1), np.zeros(1)
-    for rows in chunks(source):
-        values = rows.astype(np.float64)
-        here = values.mean(axis=0)
+    for m, here, its in each_chunk(source)(_spread_of):
         step = here - mean
-        total = n + len(values)
-        squares = squares + np.square(values - here).sum(axis=0) + step**2 * (n * len(values) / total)
-        mean = mean + step * (len(values) / total)
+        total = n + m
+        squares = squares + its + step**2 * (n * m / total)
+        mean = mean + step * (m / total)
         n = total
     return n, mean, np.sqrt(squares / n)
+
+
+def _spread_of(rows: Rows) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
+    """The number of the rows, their mean, and the sum of the squares about it."""
+    values = rows.astype(np.float64)
+    mean = values.mean(axis=0)
+    return len(values), mean, np.square(values - mean).sum(axis=0)
 
 
 def _start(mean: NDArray[np.float64], deviation: NDArray[np.float64], size: int, rng: np.random.Generator) -> Rows:

@@ -95,6 +95,7 @@ def train_dictionary(
             units=units,
             rule=rule,
             width=width,
+            work=work,
         )
         dictionary = replace(dictionary, sequences=tuple(sequence.name for sequence in training))
         dictionary.save(unfinished)

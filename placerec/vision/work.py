@@ -5,7 +5,7 @@ import json
 import logging
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 from itertools import chain
 from typing import Any
@@ -18,7 +18,7 @@ from placerec.frames import Frame, read_gray
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.batches import Batch, batches, content_key, with_images
 from placerec.frames.sequence import Gray
-from placerec.jobs import Map, Progress, workers
+from placerec.jobs import Far, Map, Progress, workers
 from placerec.journal import Journal
 from placerec.version import __version__
 from placerec.vision.images import check_gray, fit_image
@@ -163,11 +163,17 @@ def _found(
             pending.append((batch, whole + content_key(sequence, batch) if journal is not None else b""))
             yield sequence, batch
 
-    for answer in work(function, with_images(handed_out(), lambda image: _shrunk(image, spec))):
+    given = with_images(handed_out(), lambda image: _shrunk(image, spec))
+    for answer in work(function, map(_absolute, given) if isinstance(work, Far) else given):
         batch, its = pending.popleft()
         if journal is not None:
             journal.add(its, answer.pack())
         yield batch, answer
+
+
+def _absolute(batch: Batch) -> Batch:
+    """The batch for workers whose current folder is another."""
+    return replace(batch, frames=tuple(replace(frame, path=frame.path.absolute()) for frame in batch.frames))
 
 
 def _shrunk(image: Gray | str, spec: DescriptorSpec) -> Gray | str:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from placerec.errors import LanguageModelError
 from placerec.lm import NgramCounts, count_ngrams, format_counts
-from placerec.lm.count_sums import read_counts, subtract_counts
+from placerec.lm.count_sums import count_texts, read_counts, subtract_counts
 from placerec.lm.counts import add_counts
 
 VOCABULARY = ("a", "b", "c", "d")
@@ -45,6 +45,19 @@ def test_what_is_left_is_as_if_it_alone_had_been_counted(
     both = add_counts(count(kept, order, markers), count(gone, order, markers))
     assert same(both, count([*kept, *gone], order, markers))
     assert same(subtract_counts(both, count(gone, order, markers)), count(kept, order, markers))
+
+
+@given(st.lists(SENTENCES, max_size=4), st.integers(1, 4), st.booleans(), st.integers(1, 9))
+def test_pieces_of_texts_counted_apart_are_the_counts_of_the_texts(
+    texts: list[list[list[str]]], order: int, markers: bool, block: int
+) -> None:
+    strange = [[*text, ["a", "strange", "b"]] for text in texts]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("placerec.lm.counts.BLOCK", block)
+        found = list(count_texts([*texts, *strange], order, vocabulary=VOCABULARY, markers=markers))
+    assert len(found) == 2 * len(texts)
+    for counts, text in zip(found, [*texts, *strange], strict=True):
+        assert same(counts, count(text, order, markers))
 
 
 def test_a_count_below_zero_names_the_ngram() -> None:
