@@ -97,7 +97,7 @@ def _decode(name: str, data: bytes) -> NDArray[Any]:
 
 def _check_size(name: str, data: bytes) -> None:
     """Raise SourceError for a PNG or JPEG whose header promises more than MAX_PIXELS: a few bytes can be gigabytes."""
-    if data.startswith(_PNG):
+    if data.startswith(_PNG) and len(data) >= 24:
         width, height = struct.unpack_from(">II", data, 16)
     elif data.startswith(_JPEG) and (frame := _jpeg_frame(data)):
         height, width = struct.unpack_from(">HH", data, frame + 5)

@@ -282,6 +282,7 @@ def test_a_header_that_promises_too_much(tmp_path: Path) -> None:
     # One row more than OpenCV would be asked for; the same of a JPEG, whose size is behind other segments.
     (tmp_path / "b.png").write_bytes(encode(".png", np.zeros((8193, 8192), np.uint8)))
     assert failure(tmp_path / "b.png").startswith("is 8192x8193 pixels")
+    assert failure(write(tmp_path / "c.png", data[:8] + chunk(b"IEND", b""))).startswith("is no image that OpenCV")
     data = encode(".jpg", GRAY)
     frame = data.index(b"\xff\xc0")
     forged = data[: frame + 5] + struct.pack(">HH", 65_000, 65_500) + data[frame + 9 :]
