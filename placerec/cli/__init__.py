@@ -2,7 +2,9 @@
 
 import io
 import os
+import signal
 import sys
+from types import FrameType
 from typing import Any
 
 import click
@@ -98,8 +100,16 @@ for tool in SRILM_COMMANDS:
     commands.add_command(tool)
 
 
+def _terminate(number: int, frame: FrameType | None) -> None:
+    """SIGTERM is as Ctrl-C is at this moment: nothing half is left, and what a camera recorded is kept."""
+    interrupt = signal.getsignal(signal.SIGINT)
+    # Ignored as it may be in the background, it must end the program still.
+    (interrupt if callable(interrupt) else signal.default_int_handler)(signal.SIGINT, frame)
+
+
 def main() -> None:
     """Run the command line: UTF-8 in and out whatever the locale, so that files and pipes hold the same bytes."""
+    signal.signal(signal.SIGTERM, _terminate)
     for stream, errors in ((sys.stdin, "replace"), (sys.stdout, "surrogateescape"), (sys.stderr, "backslashreplace")):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(encoding="utf-8", errors=errors)

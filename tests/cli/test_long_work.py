@@ -47,6 +47,15 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+def test_to_be_terminated_is_to_be_interrupted(world: Path, tmp_path: Path) -> None:
+    with tokenizing(world, tmp_path) as process:
+        process.terminate()
+        assert process.stderr is not None
+        assert process.stderr.read() == "placerec: interrupted\n"
+    assert process.returncode == 1
+    assert os.listdir(tmp_path) == [JOURNAL]
+
+
 def test_whoever_is_stopped_goes_on_from_there(world: Path, tmp_path: Path) -> None:
     with tokenizing(world, tmp_path) as process:
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
