@@ -4,10 +4,12 @@ import logging
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
+from placerec.errors import OutputError
 from placerec.files import whole_file
-from placerec.frames import Reading, find_sequences
+from placerec.frames import Reading, Sequence, files_of, find_sequences
 from placerec.jobs import Map, Progress
 from placerec.journal import open_journal
 from placerec.vision.chunks import Source
@@ -39,6 +41,7 @@ def describe_sources(
     # The file comes first: that it cannot be written must not be found out after an hour of images.
     with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
         sequences = find_sequences(sources, reading=reading)
+        _check_unread(Path(out), sequences, matrix)
         if matrix is not None:
             save_descriptors(describe(sequences, spec, matrix=matrix), unfinished)
             return
@@ -74,6 +77,7 @@ def train_dictionary(
     """
     with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
         training, others = find_sequences(sources, reading=reading), find_sequences(held_out, reading=reading)
+        _check_unread(Path(out), [*training, *others], matrix)
         seen, unseen = (sum(len(sequence.frames) for sequence in some) for some in (training, others))
         tell = progress or (lambda done, total: None)
         values: Source
@@ -106,6 +110,15 @@ def train_dictionary(
             )
             _report_held_out(dictionary.measure(more))
     return dictionary
+
+
+def _check_unread(out: Path, sequences: Iterable[Sequence], matrix: Path | str | None) -> None:
+    """OutputError if the output would take the place of a recording, an image or a matrix that is read."""
+    if not out.exists():
+        return
+    read = chain([Path(matrix)] if matrix is not None else [], *map(files_of, sequences))
+    if any(path.exists() and path.samefile(out) for path in read):
+        raise OutputError(f"{out}: is read, and would be written over; name another output")
 
 
 def _report(dictionary: Dictionary) -> None:

@@ -10,8 +10,9 @@ from click.testing import CliRunner
 from small import write_images
 
 from placerec.cli import commands
-from placerec.frames import find_sequences
-from placerec.vision import DescriptorSpec, Dictionary, describe, train_dictionary
+from placerec.errors import OutputError
+from placerec.frames import files_of, find_sequences
+from placerec.vision import DescriptorSpec, Dictionary, describe, describe_sources, train_dictionary
 
 SPEC = DescriptorSpec(image_size=32)
 
@@ -64,3 +65,22 @@ def test_another_rule_is_another_map(tmp_path: Path) -> None:
     online = train_dictionary([tmp_path / "run1"], tmp_path / "b.npz", spec=SPEC, size=3, rule="online")
     np.testing.assert_array_equal(batch.pca.components, online.pca.components)
     assert batch.fingerprint != online.fingerprint
+
+
+def test_what_is_read_is_not_written_over(tmp_path: Path) -> None:
+    run = write_images(tmp_path / "run")
+    image = files_of(find_sequences([run])[0])[0]
+    before = image.read_bytes()
+    (tmp_path / "link.npz").symlink_to(image)
+    matrix = tmp_path / "rows.npz"
+    describe_sources([run], matrix, spec=SPEC)
+    for out in (image, tmp_path / "link.npz"):
+        with pytest.raises(OutputError, match="is read, and would be written over; name another output"):
+            describe_sources([run], out, spec=SPEC)
+        with pytest.raises(OutputError, match="is read, and would be written over"):
+            train_dictionary([run], out, spec=SPEC)
+    with pytest.raises(OutputError, match="is read, and would be written over"):
+        describe_sources([run], matrix, matrix=matrix)
+    assert image.read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 3
+    describe_sources([run], matrix, spec=SPEC)
