@@ -9,7 +9,7 @@ import struct
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from io import FileIO
 from pathlib import Path
@@ -71,7 +71,7 @@ def open_journal(output: Path) -> Iterator[Journal]:
     """The journal of the run that makes `output`, a hidden file beside it: what a killed or interrupted run left.
 
     It is removed when the run ends, be it with an error; only an interrupt and a killed worker leave it. Where another
-    run holds it, a nameless file takes its place. OutputError if the folder cannot be written.
+    run holds it, or it is another user's, a nameless file takes its place. OutputError if the folder cannot be written.
     """
     path = output.resolve()
     path = path.parent / (PARTIAL.format(path.name) + "journal")
@@ -94,11 +94,12 @@ def _opened(path: Path, output: Path) -> tuple[FileIO, bool]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         # A link there is none of ours. Without a buffer: what does not fit must not be tried again when it is closed.
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
-        file = os.fdopen(handle, "r+b", buffering=0)
-        if _lock(file):
-            return file, True
-        file.close()
+        with suppress(PermissionError):
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+            file = os.fdopen(handle, "r+b", buffering=0)
+            if _lock(file):
+                return file, True
+            file.close()
         return tempfile.TemporaryFile(dir=path.parent, buffering=0), False
     except OSError as error:
         raise OutputError(f"{output}: cannot be written: {error.strerror or error}") from error

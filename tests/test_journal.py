@@ -142,6 +142,23 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: py
         pytest.fail("the work was begun")
 
 
+def test_another_users_journal_keeps_nobody_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs = tmp_path / NAME
+    theirs.write_bytes(b"theirs")
+    real = os.open
+
+    def refuse(path: str | Path, *args: int, **more: int) -> int:
+        if Path(path) == theirs:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return real(path, *args, **more)
+
+    monkeypatch.setattr(os, "open", refuse)
+    with open_journal(tmp_path / "out.npz") as journal:
+        journal.add(b"key", b"content")
+        assert list(journal.contents()) == [b"content"]
+    assert theirs.read_bytes() == b"theirs"
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_a_full_disk_is_told_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with Path("/dev/full").open("r+b", buffering=0) as full:
