@@ -46,7 +46,12 @@ class MissingExtraError(PlacerecError):
     """An optional package that the request needs is not installed."""
 
     def __init__(self, package: str, purpose: str, remedy: str) -> None:
-        super().__init__(f"{purpose} needs the package {package}, which is not installed: {remedy}")
+        # All three to the base: by them, an error of another process is made again in this one.
+        super().__init__(package, purpose, remedy)
+
+    def __str__(self) -> str:
+        package, purpose, remedy = self.args
+        return f"{purpose} needs the package {package}, which is not installed: {remedy}"
 
 
 def at(path: "Path | str", line: int, message: str) -> str:

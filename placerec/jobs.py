@@ -4,6 +4,7 @@ import logging
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -24,6 +25,8 @@ log = logging.getLogger("placerec")
 
 # For fewer items than this, starting processes takes longer than they save.
 FEW = 5
+# The most processes: Windows waits for no more, and elsewhere systems refuse more sooner or later.
+MOST = 61 if sys.platform == "win32" else 1000
 
 
 class JobError(PlacerecError):
@@ -78,7 +81,7 @@ def processors() -> int:
 
 
 def workers(jobs: int | None = None) -> Map:
-    """What maps a function in `jobs` processes; 1: in this one; None: in threads of this one, one a processor.
+    """What maps a function in `jobs` processes (MOST at most); 1: in this one; None: in its threads, one a processor.
 
     Functions and items of processes must be importable and picklable; the function goes to each process once, and what
     it logs is logged here, in the order of the items. Only some items ahead of the results are asked for. An
@@ -109,7 +112,7 @@ def _threads(function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
 
 
 def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few: int = FEW) -> Iterator[R]:
-    rest = iter(items)
+    jobs, rest = min(jobs, MOST), iter(items)
     first = list(islice(rest, few))
     if len(first) < few:
         yield from (_threads if few > 2 else map)(function, first)

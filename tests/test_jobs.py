@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from placerec.errors import PlacerecError, StreamError
+from placerec.errors import MissingExtraError, PlacerecError, StreamError
 from placerec.jobs import FEW, map_jobs, processors, workers
 
 log = logging.getLogger("placerec.test")
@@ -54,6 +54,20 @@ def test_results_and_notes_are_in_order(jobs: int, caplog: pytest.LogCaptureFixt
 def test_an_exception_comes_through(jobs: int) -> None:
     with pytest.raises(StreamError, match="two cannot be used; take three"):
         map_jobs(fail, [1, 2, 3], jobs=jobs)
+
+
+def lack(number: int) -> int:
+    raise MissingExtraError("rosbags", "a bag", "pip install 'placerec[bag]'")
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_is_not_installed_is_told_by_other_processes_too(jobs: int) -> None:
+    with pytest.raises(MissingExtraError, match=r"^a bag needs the package rosbags, which is not installed: pip inst"):
+        map_jobs(lack, [1, 2, 3], jobs=jobs)
+
+
+def test_no_number_of_jobs_is_too_great() -> None:
+    assert map_jobs(fail, [0, 1], jobs=10**12) == [0, 1]
 
 
 def test_a_killed_process_is_told() -> None:
