@@ -45,7 +45,7 @@ def read_list() -> tuple[tuple[Frame, ...], list[tuple[str, str]]]:
 
 def _frame(number: int, text: str) -> Frame:
     path, *more = text.split("\t")
-    if len(more) > 2 or not path:
+    if len(more) > 2 or not path or "\0" in path:
         raise SourceError(at(_WHERE, number, f"{text!r} is not 'path [TAB seconds [TAB place]]'"))
     seconds, place = (*more, "", "")[:2]
     time = math.nan

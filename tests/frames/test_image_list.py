@@ -54,6 +54,7 @@ def test_names_need_not_be_utf8(given: Listed) -> None:
         ("a\nb\na\n", "<stdin>:3: a is named in line 1 already; remove one"),
         ("a\t1\tk\tx\n", r"<stdin>:1: 'a\t1\tk\tx' is not 'path [TAB seconds [TAB place]]'"),
         ("\t1\n", r"<stdin>:1: '\t1' is not 'path [TAB seconds [TAB place]]'"),
+        ("a\0b\n", r"<stdin>:1: 'a\x00b' is not 'path [TAB seconds [TAB place]]'"),
         ("a\tsoon\n", "<stdin>:1: 'soon' is not a number of seconds; mend it"),
         ("a\tnan\n", "<stdin>:1: 'nan' is not a number of seconds; mend it"),
         ("a\t1\nb\n", "<stdin>:2: some lines have seconds and others do not; give all or none"),
