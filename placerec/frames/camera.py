@@ -70,8 +70,9 @@ class Camera:
         feed = Feed(self.arrivals, room=HELD)
         told = False
         with closing(feed), ended_by_interrupt(feed):
-            log.info("%s: recording until Ctrl-C", self)
-            for arrival in feed:
+            for number, arrival in enumerate(feed):
+                if not number:
+                    log.info("%s: recording until Ctrl-C", self)
                 yield arrival.frame, arrival.image
                 if feed.dropped and not told:
                     log.warning("%s: images come faster than they are worked on; some are dropped", self)
