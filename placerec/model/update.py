@@ -8,11 +8,12 @@ import logging
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate, pairwise
+from itertools import accumulate, chain, pairwise
 from pathlib import Path
 
 from placerec.errors import LanguageModelError, ModelError, StreamError
 from placerec.files import held_folder, read_text, restore_folder, whole_folder, write_text
+from placerec.frames.naming import with_parent
 from placerec.frames.places import check_twins
 from placerec.lm import NgramCounts, count_ngrams
 from placerec.lm.count_sums import read_counts, subtract_counts
@@ -33,6 +34,7 @@ from placerec.model.train import (
     write_place,
 )
 from placerec.words import format_sentences, parse_selection, read_vocabulary
+from placerec.words.stream import stream_name
 
 # The sentences of a place, as in its file.
 Lines = list[str]
@@ -76,7 +78,7 @@ def update(
         if not forget and _knows(old, new):
             log.info("%s: has learned %s already; nothing is changed", path, ", ".join(new.record.names))
             return
-        record = _without(old, new.record) if forget else _with(old, new.record)
+        record = _without(old, new.record) if forget else _with(old, new.record, tokens)
         former = set(old.record.places)
         changed = [place for place in record.places if new.sentences.get(place) or place not in former]
         with whole_folder(path, OWNED) as folder:
@@ -141,10 +143,13 @@ def _knows(old: _Model, new: Corpus) -> bool:
     return True
 
 
-def _with(old: _Model, new: Record) -> Record:
+def _with(old: _Model, new: Record, tokens: Sequence[Path | str]) -> Record:
     """The record with `new` sequences, if they are new and their places fit beside the old ones."""
     learned = set(old.record.names)
-    for name in new.names:
+    streams = stream_files(tokens) if old.record.transitions is not None else []
+    # A stream has its folder's name in front, or not, as others beside it are called: it is learned once under both.
+    both = ((stream_name(path), with_parent(stream_name(path), path)) for path in streams)
+    for name in chain(new.names, *both):
         if name in learned:
             raise ModelError(f"{name}: {old.path} has learned a sequence of this name; rename the file of another one")
     if not new.places:

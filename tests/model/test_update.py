@@ -3,6 +3,7 @@
 import json
 import logging
 import re
+import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -225,6 +226,17 @@ def test_names_tell_what_was_learned(world: Path) -> None:
         tokens / "run2.tsv",
         forget=True,
     )
+
+
+def test_a_sequence_is_not_learned_under_two_names(world: Path) -> None:
+    (world / "new").mkdir()
+    shutil.copy(world / "tokens/run3.tsv", world / "new/run2.tsv")
+    both = world / "new/run2.tsv", world / "tokens/run2.tsv"
+    refused(world, f"run2: {world / 'model'} has learned a sequence of this name; rename", *both)
+    shutil.copy(world / "tokens/vocab.txt", world / "new/vocab.txt")
+    train_lm(both, world / "model")
+    refused(world, f"tokens-run2: {world / 'model'} has learned a sequence of this name; rename", both[1])
+    update(world / "model", both)
 
 
 @pytest.mark.parametrize(
