@@ -165,7 +165,7 @@ def _report(folder: Path, results: Sequence[DemoResult], words: WordTable, frame
         picture(
             folder / "words.png",
             "For each of the 100 words a typical frame, framed in the colour of its place",
-            "What the words look like in the six synthetic test sequences, as `placerec show-words` draws it.",
+            "What the words look like in the six synthetic test sequences, as “placerec show-words” draws it.",
         ),
         heading("Frames recognised"),
         _results_table(results),
@@ -207,7 +207,7 @@ def _texts(folder: Path, place: str) -> list[str]:
         preformatted(_head(folder / "tokens/seq4_cloudy3.tsv", 8)),
         paragraph(f"The visits to the kitchen, one a line (models/witten-bell-2/sentences/{place}.txt):"),
         preformatted(_head(model / f"sentences/{place}.txt", 3)),
-        paragraph(f"Its language model, models/witten-bell-2/{place}.arpa, as `placerec inspect` reads it:"),
+        paragraph(f"Its language model, models/witten-bell-2/{place}.arpa, as “placerec inspect” reads it:"),
         preformatted(_inspected(model, place)),
     ]
 
