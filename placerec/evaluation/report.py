@@ -31,7 +31,7 @@ th { font-weight: 600; }
 .number { text-align: right; }
 pre { background: var(--shade); border-radius: 4px; padding: .8rem 1rem; overflow-x: auto; font-size: .9rem;
       line-height: 1.5; font-family: ui-monospace, "SF Mono", Menlo, Consolas, "DejaVu Sans Mono", monospace; }
-@media (max-width: 40rem) { figure > img { max-width: none; width: 46rem; } }
+@media screen and (max-width: 40rem) { figure > img { max-width: 46rem; } }
 @media print { body { margin: 0; max-width: none; } figure, table { break-inside: avoid; } }
 """.strip()
 
