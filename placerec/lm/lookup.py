@@ -51,7 +51,8 @@ class Lookup(NamedTuple):
         before = [np.zeros(len(digits), np.int64)]
         while len(before) < len(self.tables):
             codes = np.zeros(len(digits), np.int64)
-            np.multiply(before[-1][:-1], self.V + 1, out=codes[1:])
+            if len(before) > 1:
+                np.multiply(before[-1][:-1], self.V + 1, out=codes[1:])
             codes[1:] += digits[:-1]
             codes[starts] = 0
             before.append(codes)
@@ -60,23 +61,28 @@ class Lookup(NamedTuple):
     def find(self, contexts: Sequence[Ints], digits: Ints) -> tuple[Singles, NDArray[np.int8]]:
         """log10 p float32 (T,) of words after contexts, and the length (T,) of the n-gram that answers, 0 for none."""
         order, base = len(self.tables), self.V + 1
-        row = self.tables[-1].rows.find(contexts[-1] * base + digits)
+        codes = contexts[-1] * base
+        codes += digits
+        row = self.tables[-1].rows.find(codes)
         log10_p, answered = self.tables[-1].log10_p.take(row, mode="wrap"), np.full(len(digits), order, np.int8)
         left = np.flatnonzero(row < 0)
-        unanswered = [left]
+        paid = []
         for n in range(order - 1, 0, -1):
-            row = self.tables[n - 1].rows.find(contexts[n - 1][left] * base + digits[left])
-            log10_p[left], answered[left] = self.tables[n - 1].log10_p[row], n
+            table = self.tables[n - 1]
+            # What may answer now, and the contexts that did not help before: both have n words.
+            row = table.rows.find(np.concatenate([contexts[n - 1][left] * base + digits[left], contexts[n][left]]))
+            paid.append((left, table.backoff[row[len(left) :]]))
+            row = row[: len(left)]
+            log10_p[left], answered[left] = table.log10_p[row], n
             left = left[row < 0]
-            unanswered.append(left)
         answered[left] = 0
         weight = np.zeros(len(digits), np.float32)
         # From short contexts to long: so SRILM adds their weights up.
-        for k in range(1, order):
-            at = unanswered[order - 1 - k]
-            weight[at] += self.tables[k - 1].backoff[self.tables[k - 1].rows.find(contexts[k][at])]
+        for at, its in reversed(paid):
+            weight[at] += its
         with np.errstate(invalid="ignore"):
-            return log10_p + weight, answered
+            log10_p += weight
+        return log10_p, answered
 
 
 def build_lookup(V: int, orders: Sequence[Sequence[Entries]]) -> Lookup | None:

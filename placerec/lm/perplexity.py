@@ -81,16 +81,19 @@ def tally_sentences(log10_p: Singles, unknown: Mask, scored: Mask, lengths: Ints
     """
     some = np.flatnonzero(lengths)
     starts = (np.cumsum(lengths) - lengths)[some]
-    zero = scored & (log10_p == -np.inf)
-    columns = [scored, None, None, np.where(scored & ~zero, log10_p, np.float32(0))]
+    counted = log10_p.copy()
+    counted[~scored] = 0
+    zero = counted == -np.inf
+    columns = [(4, counted)]
     if zero.any():
-        columns[1:3] = [zero & unknown, zero & ~unknown]
+        counted[zero] = 0
+        columns += [(2, zero & unknown), (3, zero & ~unknown)]
     totals = np.zeros((len(lengths), 5))
     totals[:, 0] = ended
-    for k, column in enumerate(columns, start=1):
-        if column is not None and len(some):
-            totals[some, k] = np.add.reduceat(column, starts, dtype=np.float64)
-    totals[:, 1] -= ended
+    for k, column in columns if len(some) else ():
+        totals[some, k] = np.add.reduceat(column, starts, dtype=np.float64)
+    silent = some[np.searchsorted(starts, np.flatnonzero(~scored), "right") - 1]
+    totals[:, 1] = lengths - ended - np.bincount(silent, minlength=len(lengths))
     return totals
 
 

@@ -37,7 +37,9 @@ class RowIndex:
 
     def _hashed(self, keys: Ints) -> tuple[Ints, NDArray[np.uint64]]:
         mixed = keys.view(np.uint64) * _FACTOR
-        return (mixed >> self._shift).view(np.int64), mixed << self._width
+        slot = (mixed >> self._shift).view(np.int64)
+        mixed <<= self._width
+        return slot, mixed
 
     def find(self, wanted: Ints) -> Ints:
         """The place of each of `wanted` int64 (q,), -1 where it is none of the keys; of equal keys one of them."""
@@ -47,8 +49,7 @@ class RowIndex:
         missed = np.flatnonzero(place >= self._size)
         found = place.view(np.int64)
         found[missed] = -1
-        if self._rest is not None and len(missed):
-            missed = missed[self._contested[slot[missed]]]
+        if self._rest is not None and len(missed := missed[self._contested[slot[missed]]]):
             again = self._rest.find(wanted[missed])
             found[missed] = np.where(again >= 0, self._lost[again], -1)
         return found

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from placerec.lm.logs import Floats, Ints, Mask, Singles
-from placerec.srilm.fields import LONGEST_NAME, PADDING, Fields, Packed, split_lines, with_odd_bytes
+from placerec.srilm.fields import LONGEST_NAME, Fields, Packed, split_lines, with_odd_bytes
 
 LOG_ZERO = -99.0
 # So many numbers are sooner converted one by one.
@@ -41,7 +41,7 @@ def parse_block(data: bytes, n: int, numbered: Callable[[Fields, Ints], Ints], *
     """
     if with_odd_bytes(data):
         return None
-    fields, physical = split_lines(data + PADDING, len(data))
+    fields, physical = split_lines(data)
     lines = np.flatnonzero(physical)
     count = physical[lines]
     weighted = count == n + 2
@@ -97,32 +97,35 @@ _BEHIND_NINE, _HIGH_BITS = _every_byte(0x80 - 10), _every_byte(0x80)
 _EVERY_FOURTH = np.uint64(0x000000FF000000FF)
 _HUNDREDS, _MILLIONS = np.uint64((1000000 << 32) + 100), np.uint64((10000 << 32) + 1)
 _FILLED = np.array([(1 << 8 * size) - 1 for size in range(9)], np.uint64)
-_SIGN, _POINT = ord("-"), ord(".")
+_SIGN, _POINT, _BYTE = ord("-"), ord("."), np.uint64(255)
 
 
 def _short_decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     """Numbers of one digit, a point and up to eight digits, correctly rounded; and which of the fields are that."""
     start = fields.starts[at]
-    bytes_ = np.frombuffer(fields.data, np.uint8)
-    negative = bytes_[start] == _SIGN
+    text = fields.eights[start]
+    negative = text & _BYTE == _SIGN
     start += negative
     size = fields.lengths[at] - negative - 2
-    whole = bytes_[start] - np.uint8(ord("0"))
+    text >>= np.uint64(8) * negative
+    whole = (text & _BYTE) - np.uint64(ord("0"))
     digits, plain = _eight_digits(fields.eights[start + 2], _FILLED.take(size, mode="clip"))
-    plain &= (whole <= 9) & (bytes_[start + 1] == _POINT) & (size >= 0) & (size <= 8)
+    plain &= (whole <= 9) & (text >> np.uint64(8) & _BYTE == _POINT) & (size >= 0) & (size <= 8)
     # Both are exact, so that the quotient is the float64 nearest to the decimal number.
-    value = (whole * np.int64(10**8) + digits) / 1e8
+    value = (whole * np.uint64(10**8) + digits) / 1e8
     return np.where(negative, -value, value), plain
 
 
-def _eight_digits(text: Packed, filled: Packed) -> tuple[Ints, Mask]:
+def _eight_digits(text: Packed, filled: Packed) -> tuple[Packed, Mask]:
     """The numbers that eight bytes spell, zeros behind what is `filled`; and whether these are digits."""
-    digit = (text & filled | _ZEROS & ~filled) - _ZEROS
+    digit = text ^ _ZEROS
+    digit &= filled
     plain = (digit | digit + _BEHIND_NINE) & _HIGH_BITS == 0
     # Pairs of digits, then fours, then all eight at once.
     pairs = digit * np.uint64(10) + (digit >> np.uint64(8))
     number = (pairs & _EVERY_FOURTH) * _HUNDREDS + (pairs >> np.uint64(16) & _EVERY_FOURTH) * _MILLIONS
-    return (number >> np.uint64(32)).view(np.int64), plain
+    number >>= np.uint64(32)
+    return number, plain
 
 
 def _decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:

@@ -11,10 +11,12 @@ from placerec.lm.row_index import RowIndex
 
 Packed = NDArray[np.uint64]
 SHORT_NAME, LONGEST_NAME = 8, 16
-PADDING = b"\n" * 24
+_PADDING = bytes(24)
 _ODD_BYTES = (b"\0", b"\v", b"\f")
 _TAB, _LINE_END, _RETURN, _BLANK = b"\t\n\r "
 _COMMENT = np.uint64(int.from_bytes(b"##", "little"))
+# What no name's bytes are: none of these is 0.
+_HOLE = np.uint64(0)
 _TWO_BYTES = np.uint64(0xFFFF)
 # The bytes of a number that a field of so many bytes fills.
 _FILLED = np.array([(1 << 8 * size) - 1 for size in range(SHORT_NAME + 1)], np.uint64)
@@ -32,7 +34,7 @@ def unusual(data: bytes) -> bool:
 
 
 class Fields:
-    """The fields of a block of lines: where they start and how long they are, (f,); `data` is padded."""
+    """The fields of whole lines, `data`: where they start and how long they are, (f,)."""
 
     def __init__(self, data: bytes, starts: Ints, lengths: Ints) -> None:
         self.data, self.starts, self.lengths = data, starts, lengths
@@ -44,8 +46,11 @@ class Fields:
 
     @cached_property
     def eights(self) -> Packed:
-        """Eight bytes from every place on as one number, uint64."""
-        return np.ndarray((len(self.data) - 7,), "<u8", self.data, strides=(1,))
+        """Eight bytes from every place on as one number, uint64; behind the end are zeros."""
+        inside = max(0, len(self.data) - 7)
+        end = self.data[inside:] + _PADDING
+        # Copied, as it is aligned then: that pays where most places are asked for.
+        return np.concatenate([_eights(self.data, inside), _eights(end, len(end) - 7)])
 
     def packed(self, at: Ints) -> tuple[Packed, Packed]:
         """The first 16 bytes of the fields `at` as two numbers each."""
@@ -55,25 +60,27 @@ class Fields:
         return low, high
 
 
-def split_lines(data: bytes, size: int) -> tuple[Fields, Ints]:
-    """The fields of whole lines, separated by blanks, tabs and line ends, and how many there are in each line.
+def _eights(data: bytes, places: int) -> Packed:
+    return np.ndarray((places,), "<u8", data, strides=(1,))
 
-    `data`: the lines, `size` bytes, and PADDING behind them.
-    """
-    if size and data[size - 1] != _LINE_END:
-        size += 1
-    buffer = np.frombuffer(data, np.uint8, size)
+
+def split_lines(data: bytes) -> tuple[Fields, Ints]:
+    """The fields of whole lines, separated by blanks, tabs and line ends, and how many there are in each line."""
+    if data and data[-1] != _LINE_END:
+        data += b"\n"
+    buffer = np.frombuffer(data, np.uint8)
     at = np.flatnonzero(buffer <= _BLANK)
     return _single_blanks(data, at, buffer[at]) or _any_blanks(data, buffer)
 
 
 def _single_blanks(data: bytes, at: Ints, kind: NDArray[np.uint8]) -> tuple[Fields, Ints] | None:
     """The same where one separator stands behind every field, as programs write lines; `kind` (f,) `at` places (f,)."""
-    starts = np.zeros(len(at), np.int64)
+    starts = np.empty_like(at)
+    starts[:1] = 0
     np.add(at[:-1], 1, out=starts[1:])
-    lengths = at - starts
+    lengths = np.subtract(at, starts, out=at)
     line_end = kind == _LINE_END
-    if (lengths == 0).any() or not (line_end | (kind == _BLANK) | (kind == _TAB)).all():
+    if not lengths.min(initial=1) or not (line_end | (kind == _BLANK) | (kind == _TAB)).all():
         return None
     return Fields(data, starts, lengths), np.diff(np.flatnonzero(line_end), prepend=-1)
 
@@ -109,15 +116,17 @@ class NameTable:
     def __init__(self, index: Mapping[str, int]) -> None:
         self.index = index
         self.size = len(index)
-        named = [(name.encode("latin-1"), number) for name, number in index.items() if len(name) <= LONGEST_NAME]
-        packed = np.array([name for name, _ in named], f"S{LONGEST_NAME}").view("<u8").reshape(-1, 2)
-        numbers = np.array([number for _, number in named], np.int64)
-        long = packed[:, 1] > 0
-        self.short = RowIndex(packed[~long, 0].view(np.int64))
+        packed = np.array([name.encode("latin-1") for name in index], f"S{LONGEST_NAME}").view("<u8").reshape(-1, 2)
+        length = np.fromiter(map(len, index), np.int64, self.size)
+        numbers = np.fromiter(index.values(), np.int64, self.size)
+        # Longer names leave a hole, so that in most lists a name's place is its number.
+        self.short = RowIndex(np.where(length <= SHORT_NAME, packed[:, 0], _HOLE).view(np.int64))
+        self.short_numbers = None if (numbers == np.arange(self.size)).all() else np.append(numbers, -1)
+        long = (length > SHORT_NAME) & (length <= LONGEST_NAME)
         self.halves = RowIndex(packed[long].ravel().view(np.int64))
         self.long = RowIndex(self._pairs(packed[long, 0], packed[long, 1]))
         # At the end, what is found for a name that is not listed.
-        self.short_numbers, self.long_numbers = np.append(numbers[~long], -1), np.append(numbers[long], -1)
+        self.long_numbers = np.append(numbers[long], -1)
 
     def find(self, fields: Fields, at: Ints | slice) -> Ints:
         """The numbers of the fields `at` (m,), -1 for a name that is not listed."""
@@ -125,9 +134,11 @@ class NameTable:
         # Of a longer name this is the start. `take` copies them all beforehand, which pays where most are asked for.
         name = fields.eights.take(start)
         name &= _FILLED.take(length, mode="clip")
-        number = self.short_numbers.take(self.short.find(name.view(np.int64)), mode="wrap")
-        long = np.flatnonzero(length > SHORT_NAME)
-        if len(long):
+        number = self.short.find(name.view(np.int64))
+        if self.short_numbers is not None:
+            number = self.short_numbers.take(number, mode="wrap")
+        if length.max(initial=0) > SHORT_NAME:
+            long = np.flatnonzero(length > SHORT_NAME)
             number[long] = self._find_long(fields, np.arange(len(fields.starts))[at][long])
         return number
 

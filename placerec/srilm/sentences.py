@@ -10,13 +10,12 @@ import numpy as np
 from placerec.lm.logs import Floats, Ints, Mask
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage
-from placerec.srilm.fields import PADDING, NameTable, split_lines, with_odd_bytes, without_comments
+from placerec.srilm.fields import NameTable, split_lines, with_odd_bytes, without_comments
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import Lines, Streams, tokens
 from placerec.srilm.vocabulary import WordList
 
 LONGEST = 50000
-_NOTHING = -2
 # Bytes read at once where lines are as programs write them, and words where they are not.
 _BLOCK, _BATCH = 1 << 19, 1 << 18
 
@@ -71,7 +70,7 @@ def read_sentences(name: str, words: WordList, handling: Handling, streams: Stre
 
 def _read_quickly(lines: Lines, block: bytes, names: NameTable, words: WordList, streams: Streams) -> Sentences:
     block = block.lower() if words.lower else block
-    fields, lengths = without_comments(*split_lines(block + PADDING, len(block)))
+    fields, lengths = without_comments(*split_lines(block))
     numbers = names.find(fields, slice(None))
     numbers[numbers < 0] = words.index[words.unknown]
     too_long = lengths > LONGEST
@@ -136,9 +135,9 @@ def mark(sentences: Sentences, words: WordList, handling: Handling) -> tuple[Pas
     numbers, size = sentences.numbers, len(sentences.lengths)
     stops = np.cumsum(sentences.lengths)
     some = sentences.lengths > 0
-    padded = np.concatenate([numbers, [_NOTHING]])
-    opened = some & (padded[np.where(some, stops - sentences.lengths, len(numbers))] == start_number)
-    ended = some & (padded[np.where(some, stops - 1, len(numbers))] == end_number)
+    opened, ended = np.zeros(size, bool), np.zeros(size, bool)
+    opened[some] = numbers[(stops - sentences.lengths)[some]] == start_number
+    ended[some] = numbers[(stops - 1)[some]] == end_number
     lengths = sentences.lengths
     if handling.noise and (noise := np.isin(numbers, list(handling.noise))).any():
         lengths = np.bincount(np.repeat(np.arange(size), lengths)[~noise], minlength=size)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.srilm import arpa_block
-from placerec.srilm.fields import PADDING, Fields, NameTable, split_lines, unusual, with_odd_bytes, without_comments
+from placerec.srilm.fields import Fields, NameTable, split_lines, unusual, with_odd_bytes, without_comments
 from placerec.srilm.streams import tokens
 
 lines = st.lists(st.text("ab#\t \r\x01\xe9", max_size=8), max_size=6)
@@ -15,7 +15,7 @@ names = st.text("abc", min_size=1, max_size=20)
 
 def fields_of(text: str, *, comments: bool = True) -> list[list[str]]:
     data = text.encode("latin-1")
-    fields, count = split_lines(data + PADDING, len(data))
+    fields, count = split_lines(data)
     if not comments:
         fields, count = without_comments(fields, count)
     found = [fields.text(i).decode("latin-1") for i in range(len(fields.starts))]
@@ -39,12 +39,12 @@ def test_a_line_has_no_line_behind_its_end() -> None:
     assert fields_of("") == []
 
 
-@given(st.lists(names, unique=True), st.lists(names))
-def test_names_are_found(listed: list[str], asked: list[str]) -> None:
-    table = NameTable({name: number for number, name in enumerate(listed)})
+@given(st.lists(names, unique=True), st.lists(names), st.sampled_from([1, 3]))
+def test_names_are_found(listed: list[str], asked: list[str], step: int) -> None:
+    table = NameTable({name: step * number for number, name in enumerate(listed)})
     data = "".join(f"{name}\n" for name in asked).encode()
-    fields, _ = split_lines(data + PADDING, len(data))
-    expected = [listed.index(name) if name in listed else -1 for name in asked]
+    fields, _ = split_lines(data)
+    expected = [step * listed.index(name) if name in listed else -1 for name in asked]
     assert table.find(fields, slice(None)).tolist() == expected
 
 
@@ -53,7 +53,7 @@ def test_names_for_one_slot_are_told_apart() -> None:
     listed = [f"{'x' * (size - 4)}{number:04d}" for size in (4, 8, 9, 12, 16, 17) for number in range(3000)]
     table = NameTable({name: number for number, name in enumerate(listed)})
     data = "".join(f"{name}\n{name}x\n" for name in listed).encode()
-    fields, _ = split_lines(data + PADDING, len(data))
+    fields, _ = split_lines(data)
     found = table.find(fields, slice(None)).reshape(-1, 2)
     assert found[:, 0].tolist() == list(range(len(listed)))
     assert (found[:, 1] == -1).all()
@@ -69,7 +69,7 @@ decimals = st.one_of(
 @given(st.lists(decimals, min_size=1), st.sampled_from([0, arpa_block._FEW]))
 def test_decimal_numbers_are_rounded_as_python_rounds_them(texts: list[str], few: int) -> None:
     data = "".join(f"{text}\n" for text in texts).encode()
-    fields, _ = split_lines(data + PADDING, len(data))
+    fields, _ = split_lines(data)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(arpa_block, "_FEW", few)
         values = arpa_block._numbers(fields, np.arange(len(texts)), most=0.0)
@@ -81,7 +81,7 @@ def test_decimal_numbers_are_rounded_as_python_rounds_them(texts: list[str], few
 @given(st.lists(st.text("0123456789.-+ex/:", min_size=1, max_size=12), min_size=1))
 def test_what_is_taken_for_a_short_decimal_is_one(texts: list[str]) -> None:
     data = "".join(f"{text}\n" for text in texts).encode()
-    fields, _ = split_lines(data + PADDING, len(data))
+    fields, _ = split_lines(data)
     for decode in (arpa_block._short_decimals, arpa_block._decimals):
         values, plain = decode(fields, np.arange(len(texts)))
         for text, value, is_plain in zip(texts, values.tolist(), plain.tolist(), strict=True):
@@ -89,8 +89,10 @@ def test_what_is_taken_for_a_short_decimal_is_one(texts: list[str]) -> None:
 
 
 def test_fields_near_the_end_can_be_packed() -> None:
-    data = b"a\n" + PADDING
-    assert Fields(data, np.array([0]), np.array([1])).packed(np.array([0]))[0].tolist() == [ord("a")]
+    for text in (b"a\n", b"a bc\n", b"abcdefgh\n", b"abcdefghijklmnop\n"):
+        fields = Fields(text, np.array([0]), np.array([len(text) - 1]))
+        low, high = fields.packed(np.array([0]))
+        assert (low.tobytes() + high.tobytes()).rstrip(b"\0") == text[:-1]
 
 
 @pytest.mark.parametrize(
