@@ -1,6 +1,6 @@
 """The fields of many lines at once, and the numbers of the words among them."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +31,17 @@ def unusual(data: bytes) -> bool:
     """Whether lines hold such bytes, or comments: they go line by line."""
     # One byte is found much faster than several.
     return with_odd_bytes(data) or (b"#" in data and (data.startswith(b"##") or b"\n##" in data))
+
+
+def usual_blocks(
+    blocks: Iterable[bytes], is_unusual: Callable[[bytes], bool], unusual_one: list[bytes]
+) -> Iterator[bytes]:
+    """The blocks before the first unusual one, which is handed back, each with a line end."""
+    for block in blocks:
+        if is_unusual(block):
+            unusual_one.append(block)
+            return
+        yield block if block.endswith(b"\n") else block + b"\n"
 
 
 class Fields:

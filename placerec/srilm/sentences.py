@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from placerec.lm.ahead import make_ahead
 from placerec.lm.logs import Floats, Ints, Mask
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage
-from placerec.srilm.fields import NameTable, split_lines, with_odd_bytes, without_comments
+from placerec.srilm.fields import NameTable, split_lines, usual_blocks, with_odd_bytes, without_comments
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import Lines, Streams, tokens
 from placerec.srilm.vocabulary import WordList
@@ -57,30 +58,29 @@ def read_sentences(name: str, words: WordList, handling: Handling, streams: Stre
     lines = streams.lines(name)
     blocks = lines.blocks(_BLOCK)
     if not (handling.weight or handling.escape is not None or handling.verbose):
-        names = NameTable(words.index)
-        for block in blocks:
-            if with_odd_bytes(block):
-                blocks = chain([block], blocks)
-                break
-            yield _read_quickly(lines, block, names, words, streams)
-        else:
+        careful: list[bytes] = []
+        # Nothing else is said meanwhile, so that messages keep their order.
+        yield from make_ahead(_read_quickly(lines, usual_blocks(blocks, with_odd_bytes, careful), words, streams))
+        if not careful:
             return
+        blocks = chain(careful, blocks)
     yield from _read_carefully(lines, blocks, words, handling, streams)
 
 
-def _read_quickly(lines: Lines, block: bytes, names: NameTable, words: WordList, streams: Streams) -> Sentences:
-    block = block.lower() if words.lower else block
-    fields, lengths = without_comments(*split_lines(block))
-    numbers = names.find(fields, slice(None))
-    numbers[numbers < 0] = words.index[words.unknown]
-    too_long = lengths > LONGEST
-    if too_long.any():
-        for number in np.flatnonzero(too_long).tolist():
-            streams.say(f"{lines.name}: line {lines.number + number + 1}: too many words per sentence")
-        numbers, lengths = numbers[~np.repeat(too_long, lengths)], np.where(too_long, 0, lengths)
-    lines.number += len(lengths)
-    used = lengths[lengths > 0]
-    return Sentences(numbers, used, np.ones(len(used)))
+def _read_quickly(lines: Lines, blocks: Iterable[bytes], words: WordList, streams: Streams) -> Iterator[Sentences]:
+    names = NameTable(words.index)
+    for block in blocks:
+        fields, lengths = without_comments(*split_lines(block.lower() if words.lower else block))
+        numbers = names.find(fields, slice(None))
+        numbers[numbers < 0] = words.index[words.unknown]
+        too_long = lengths > LONGEST
+        if too_long.any():
+            for number in np.flatnonzero(too_long).tolist():
+                streams.say(f"{lines.name}: line {lines.number + number + 1}: too many words per sentence")
+            numbers, lengths = numbers[~np.repeat(too_long, lengths)], np.where(too_long, 0, lengths)
+        lines.number += len(lengths)
+        used = lengths[lengths > 0]
+        yield Sentences(numbers, used, np.ones(len(used)))
 
 
 def _read_carefully(

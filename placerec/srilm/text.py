@@ -13,7 +13,7 @@ from placerec.lm.logs import Ints
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.stored_text import BLOCK, Numbers, StoredText
 from placerec.srilm.counts_file import parse_count
-from placerec.srilm.fields import unusual
+from placerec.srilm.fields import unusual, usual_blocks
 from placerec.srilm.numbering import Numbering, cut_words
 from placerec.srilm.streams import Lines, Streams, tokens
 from placerec.srilm.vocabulary import WordList
@@ -79,7 +79,7 @@ def _parts(lines: Lines, words: WordList, marking: Marking, streams: Streams) ->
         careful: list[bytes] = []
         numbering = Numbering(words)
         # Words are cut beside, and numbered here in their order.
-        for cut in work_ahead(cut_words, _usual(blocks, careful)):
+        for cut in work_ahead(cut_words, usual_blocks(blocks, unusual, careful)):
             if (cut.per_line > LONGEST_LINE).any():
                 yield from _read_carefully(lines, [cut.data], words, marking, streams)
             else:
@@ -87,15 +87,6 @@ def _parts(lines: Lines, words: WordList, marking: Marking, streams: Streams) ->
                 yield _Part(numbering.numbers_of(cut), cut.per_line[cut.per_line > 0])
         blocks = chain(careful, blocks)
     yield from _read_carefully(lines, blocks, words, marking, streams)
-
-
-def _usual(blocks: Iterable[bytes], unusual_one: list[bytes]) -> Iterator[bytes]:
-    """The blocks before the first unusual one, which is handed back, each with a line end."""
-    for block in blocks:
-        if unusual(block):
-            unusual_one.append(block)
-            return
-        yield block if block.endswith(b"\n") else block + b"\n"
 
 
 def _read_carefully(
