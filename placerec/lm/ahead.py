@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
 _AHEAD = 4
-_MADE_AHEAD = 16
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 
@@ -33,7 +32,7 @@ def make_ahead(items: Iterable[_Item]) -> Iterator[_Item]:
     """The items, of which another thread makes the next few while one is used."""
     made: deque[_Item] = deque()
     errors: list[BaseException] = []
-    ready, room = Semaphore(0), Semaphore(_MADE_AHEAD)
+    ready, room = Semaphore(0), Semaphore(_AHEAD)
     wanted = True
 
     def make() -> None:

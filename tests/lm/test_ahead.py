@@ -37,14 +37,14 @@ def test_not_too_many_items_are_made_ahead() -> None:
     made = []
 
     def items() -> Iterator[int]:
-        for number in range(10 * ahead._MADE_AHEAD):
+        for number in range(10 * ahead._AHEAD):
             made.append(number)
             yield number
 
     for number in make_ahead(items()):
         time.sleep(0.001)
         # One more is held by who made it, until there is room.
-        assert len(made) <= number + ahead._MADE_AHEAD + 2
+        assert len(made) <= number + ahead._AHEAD + 2
 
 
 def test_an_error_comes_after_what_was_made_before() -> None:
