@@ -142,7 +142,7 @@ class NameTable:
     def find(self, fields: Fields, at: Ints | slice) -> Ints:
         """The numbers of the fields `at` (m,), -1 for a name that is not listed."""
         start, length = fields.starts[at], fields.lengths[at]
-        # Of a longer name this is the start. `take` copies them all beforehand, which pays where most are asked for.
+        # Of a longer name this is the start.
         name = fields.eights.take(start)
         name &= _FILLED.take(length, mode="clip")
         number = self.short.find(name.view(np.int64))
