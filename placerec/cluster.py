@@ -22,7 +22,7 @@ from time import monotonic
 from typing import Any, Generic, TypeVar
 from uuid import uuid4
 
-from placerec.errors import MissingExtraError
+from placerec.errors import check_optional
 from placerec.jobs import Each, Far, JobError, Listed, Noted, noted
 from placerec.version import __version__
 
@@ -73,10 +73,9 @@ def cluster(address: str) -> Iterator[Far]:
 @contextmanager
 def _quiet() -> Iterator[Any]:
     """The module `distributed`, whose loggers and warnings are kept from the user meanwhile: its errors are ours."""
-    try:
-        import distributed
-    except ImportError as error:
-        raise MissingExtraError("distributed", "--cluster", "pip install 'placerec[cluster]'") from error
+    check_optional("distributed", "--cluster")
+    import distributed
+
     loggers = [logging.getLogger(name) for name in {*_TALKERS, *logging.root.manager.loggerDict} if _talks(name)]
     levels = [(logger, logger.level) for logger in loggers]
     for logger in loggers:

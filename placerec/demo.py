@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.errors import check_optional
 from placerec.evaluation import (
     Evaluation,
     evaluate,
@@ -57,7 +58,9 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
     """`placerec demo`: render the laboratory, learn words and models, recognise the test runs, write the folder `out`.
 
     `progress(label)` is a context manager that gives a callback(done, total). Returns a result per smoothing and order.
+    Raises MissingExtraError without matplotlib, before any work.
     """
+    check_optional("matplotlib", "a picture")
     with whole_folder(Path(out), OWNED) as folder:
         log.info("Rendering the synthetic laboratory (%s, seed %d)", scale, seed)
         with progress("render") as show:

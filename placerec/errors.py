@@ -1,5 +1,6 @@
 """What can go wrong for a reason that the user can mend: one class per room, one base for the border to catch."""
 
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -52,6 +53,30 @@ class MissingExtraError(PlacerecError):
     def __str__(self) -> str:
         package, purpose, remedy = self.args
         return f"{purpose} needs the package {package}, which is not installed: {remedy}"
+
+
+# By the name that it is imported under: what a user calls the package, and what installs it.
+_OPTIONAL = {
+    "matplotlib": ("matplotlib", "pip install 'placerec[plot]'"),
+    "sklearn": ("scikit-learn", "pip install 'placerec[systems]'"),
+    "rosbags": ("rosbags", "pip install 'placerec[bag]'"),
+    "distributed": ("distributed", "pip install 'placerec[cluster]'"),
+    "kenlm": ("kenlm", "pip install kenlm (it is compiled; not on Windows, nor on Python 3.13)"),
+}
+
+
+def check_optional(module: str, purpose: str, instead: str = "") -> None:
+    """Raise MissingExtraError if an optional package is not installed; nothing is imported.
+
+    To be called before any work, and not where the package is used at the end of it. `instead`: another remedy.
+    """
+    package, remedy = _OPTIONAL[module]
+    try:
+        found = find_spec(module) is not None
+    except ImportError:
+        found = False
+    if not found:
+        raise MissingExtraError(package, purpose, ", or ".join(filter(None, (remedy, instead))))
 
 
 def at(path: "Path | str", line: int, message: str) -> str:

@@ -7,17 +7,16 @@ share of the votes, so that it has few values and is zero in most places. scikit
 import numpy as np
 
 from placerec.baselines.views import Floats, PointFollow, Views
-from placerec.errors import MissingExtraError
+from placerec.errors import check_optional
 
 NEIGHBOURS = 5
 
 
 def fit(views: Views, *, neighbours: int = NEIGHBOURS) -> PointFollow:
     """Beliefs by the votes of the nearest `neighbours`; MissingExtraError without scikit-learn."""
-    try:
-        from sklearn.neighbors import KDTree
-    except ImportError as error:
-        raise MissingExtraError("scikit-learn", "knn", "pip install 'placerec[systems]'") from error
+    check_optional("sklearn", "knn")
+    from sklearn.neighbors import KDTree
+
     tree = KDTree(views.points)
     voters = min(neighbours, len(views.truth))
     places = len(views.places)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from placerec.baselines.lesson import normalised
 from placerec.baselines.views import Floats, PointFollow, Views, filtered, held_out_folds, scattered
-from placerec.errors import MissingExtraError
+from placerec.errors import check_optional
 from placerec.hohmm import fit_calibration, learned_transition
 
 LN10 = float(np.log(10))
@@ -70,10 +70,9 @@ def margins(points: Floats, weights: Floats, offsets: Floats) -> Floats:
 
 def _machines(views: Views, among: NDArray[np.bool_], scale: float, seed: int) -> tuple[Floats, Floats]:
     """One machine per place seen: weights (D, k) and offsets (D,)."""
-    try:
-        from sklearn.svm import LinearSVC
-    except ImportError as error:
-        raise MissingExtraError("scikit-learn", "ullah2008", "pip install 'placerec[systems]'") from error
+    check_optional("sklearn", "ullah2008")
+    from sklearn.svm import LinearSVC
+
     machine = LinearSVC(dual=False, random_state=seed).fit(views.points[among] / scale, views.truth[among])
     weights, offsets = machine.coef_, machine.intercept_
     if len(weights) == 1:

@@ -12,11 +12,10 @@ import logging
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from placerec.errors import EvaluationError, MissingExtraError, OutputError, SourceError
+from placerec.errors import EvaluationError, OutputError, SourceError, check_optional
 from placerec.evaluation.bootstrap import LEAST
 from placerec.evaluation.compare_plot import plot_comparison
 from placerec.evaluation.comparison import Comparison, format_methods, format_pairs, judge
@@ -100,9 +99,8 @@ def check_methods(methods: Iterable[str] | None = None) -> list[str]:
 def _check_installed(names: Iterable[str]) -> None:
     """Before any work: MissingExtraError for the first method that cannot run."""
     for name in names:
-        if name in NEED_SKLEARN and find_spec("sklearn") is None:
-            remedy = "pip install 'placerec[systems]', or leave it out of --methods"
-            raise MissingExtraError("scikit-learn", name, remedy)
+        if name in NEED_SKLEARN:
+            check_optional("sklearn", name, "leave it out of --methods")
 
 
 def _split(

@@ -34,8 +34,8 @@ def show_words(
     descriptors that were computed elsewhere (`describe`). Raises what `find_sequences`, `describe` and
     `draw_word_sheet` raise.
     """
-    dictionary = Dictionary.load(words)
     with _picture(out) as picture:
+        dictionary = Dictionary.load(words)
         table, sequences = _looked_up(sources, dictionary, reading, progress, matrix)
         if picture is not None:
             images = typical_images(table, sequences)
@@ -57,9 +57,9 @@ def show_frame(
     `sources`: sequences whose frames tell what the units look like and which places they belong to. `out`: the
     picture to draw. Raises as `show_words` does, and SourceError or VisionError for an image that cannot be used.
     """
-    dictionary = Dictionary.load(words)
-    view = view_frame(image, dictionary)
     with _picture(out) as picture:
+        dictionary = Dictionary.load(words)
+        view = view_frame(image, dictionary)
         sequences: list[Sequence] = []
         if sources := list(sources):
             table, sequences = _looked_up(sources, dictionary, reading, progress)
@@ -83,8 +83,8 @@ def stability(
 
     `out`: the picture to draw. `seed`: of the noise. Raises as `show_words` does.
     """
-    dictionary = Dictionary.load(words)
     with _picture(out) as picture:
+        dictionary = Dictionary.load(words)
         found = word_changes(find_sequences(sources, reading=reading), dictionary, seed=seed, progress=progress)
         if picture is not None:
             plot_stability(found, picture)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import MissingExtraError, OutputError
+from placerec.errors import OutputError, check_optional
 from placerec.evaluation.metrics import Evaluation, codes, place_order, right_frames
 from placerec.evaluation.summary import percent, shorten
 from placerec.files import whole_file
@@ -79,10 +79,7 @@ def check_figure(path: Path | str) -> None:
     """Raise what `figure_file` would, of suffix and matplotlib: before an hour of work, and not after it."""
     if Path(path).suffix.lower() not in _METADATA:
         raise OutputError(f"{path}: no kind of picture; let its name end in .png, .svg or .pdf")
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        raise MissingExtraError("matplotlib", "a picture", "pip install 'placerec[plot]'") from error
+    check_optional("matplotlib", "a picture")
 
 
 def place_colours(places: Sequence[str]) -> NDArray[np.float64]:

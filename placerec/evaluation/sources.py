@@ -8,6 +8,7 @@ from pathlib import Path
 
 from placerec.errors import EvaluationError
 from placerec.evaluation.metrics import Evaluation, evaluate
+from placerec.evaluation.panels import check_figure
 from placerec.evaluation.plots import plot_evaluation
 from placerec.frames.naming import unique_names
 from placerec.hohmm.beliefs import Beliefs, parse_beliefs, read_beliefs
@@ -21,6 +22,8 @@ def evaluate_files(sources: Iterable[Path | str], *, plot: Path | str | None = N
     Files of one name are called by their folders too. Raises EvaluationError for what cannot be read or judged, and
     what `plot_evaluation` raises.
     """
+    if plot is not None:
+        check_figure(plot)
     paths = _files([Path(source) for source in sources])
     beliefs = [_read(path) for path in paths]
     names = unique_names([(one.name, path) for one, path in zip(beliefs, paths, strict=True)], EvaluationError)

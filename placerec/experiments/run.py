@@ -33,8 +33,9 @@ def experiment(config: Path | str, out: Path | str, *, jobs: int = 1, progress: 
     a config that cannot be used, OutputError if another run is at work in `out`, and what the commands raise that it
     stands for.
     """
-    plan, out = read_config(config), Path(out)
+    out = Path(out)
     check_figure(out / "figure.png")
+    plan = read_config(config)
     with _at_work(out):
         units, results = run_grid(plan, out, jobs=jobs, progress=progress)
         write_reports(results, plan, Path(config), units, out)

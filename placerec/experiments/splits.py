@@ -12,6 +12,10 @@ _COLD = re.compile(r"(?:.*[-_])?seq([1-4])_(cloudy|night|sunny)([0-9]+)")
 _ILLUMINATION = re.compile(r".*(cloudy|night|sunny)[0-9]*")
 ILLUMINATIONS = ("cloudy", "night", "sunny")
 
+# The paths of Saarbruecken's part B, and the runs that the paper uses: the last one tests.
+_PART_B = ("3", "4")
+_RUNS = ("1", "2", "3")
+
 
 @dataclass(frozen=True)
 class Fold:
@@ -52,7 +56,8 @@ def leave_one_illumination_out(names: Sequence[str]) -> list[Fold]:
 def cold_saarbruecken_b(names: Sequence[str]) -> list[Fold]:
     """The paper's: of part B (seq3, seq4) of COLD's Saarbruecken, runs 1 and 2 train and run 3 tests (readings 0.3).
 
-    Sequences of part A are left out. Raises ExperimentError unless the 18 sequences of part B are there, once each.
+    Sequences of part A, and further runs of part B, are left out. Raises ExperimentError unless the 18 sequences are
+    there, once each.
     """
     parts = {name: match for name in names if (match := _COLD.fullmatch(name))}
     for name in names:
@@ -61,16 +66,17 @@ def cold_saarbruecken_b(names: Sequence[str]) -> list[Fold]:
                 f"[data] split: cold-saarbruecken-b needs COLD's names (seq3_cloudy1), and {name!r} is none; "
                 "leave that sequence out, or name the tests"
             )
-    used = [name for name in names if parts[name][1] in "34"]
+    used = [name for name in names if parts[name][1] in _PART_B]
     found = [f"seq{m[1]}_{m[2]}{m[3]}" for m in map(parts.__getitem__, used)]
-    for wanted in (f"seq{path}_{light}{run}" for path in "34" for light in ILLUMINATIONS for run in "123"):
+    for wanted in (f"seq{path}_{light}{run}" for path in _PART_B for light in ILLUMINATIONS for run in _RUNS):
         if found.count(wanted) != 1:
             times = found.count(wanted) or "not"
             raise ExperimentError(
                 f"[data] split: cold-saarbruecken-b needs each sequence of part B once, and {wanted} is there {times}"
                 f"{' times' * (times != 'not')}; complete them, or name the tests"
             )
-    return [_fold("test", [n for n in used if parts[n][3] in "123"], [n for n in used if parts[n][3] == "3"])]
+    runs = [name for name in used if parts[name][3] in _RUNS]
+    return [_fold("test", runs, [name for name in runs if parts[name][3] == _RUNS[-1]])]
 
 
 SPLITS: dict[str, Callable[[Sequence[str]], list[Fold]]] = {

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from placerec.errors import MissingExtraError, PlacerecError, SourceError
+from placerec.errors import PlacerecError, SourceError, check_optional
 from placerec.frames.ros_image import COMPRESSED, RAW, gray_of
 from placerec.frames.sequence import Frame, Gray
 
@@ -105,11 +105,10 @@ def list_bag(path: Path, topic: str | None) -> tuple[str, "array[int]", list[flo
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    try:
-        from rosbags.rosbag1 import Reader as Reader1
-        from rosbags.rosbag2 import Reader as Reader2
-    except ImportError as error:
-        raise MissingExtraError("rosbags", f"{path}: a bag", "pip install 'placerec[bag]'") from error
+    check_optional("rosbags", f"{path}: a bag")
+    from rosbags.rosbag1 import Reader as Reader1
+    from rosbags.rosbag2 import Reader as Reader2
+
     try:
         reader = Reader1(path) if _is_ros1(path) else Reader2(path)
         reader.open()

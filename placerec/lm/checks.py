@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import LanguageModelError
+from placerec.errors import LanguageModelError, check_optional
 from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.external import KENLM_MAX_ORDER, kenlm_scorer
+from placerec.lm.external import KENLM_MAX_ORDER, KENLM_PURPOSE, kenlm_scorer
 from placerec.lm.trie import per_context
 
 # Half a unit of the seventh digit for each of the terms that a context's sum is made of.
@@ -119,6 +119,8 @@ def check_model(path: Path | str, *, tokens: int = 2000, seed: int = 0) -> Model
     Raises LanguageModelError for an unreadable file, MissingExtraError without KenLM.
     """
     model = read_arpa(path)
+    if model.order <= KENLM_MAX_ORDER:
+        check_optional("kenlm", KENLM_PURPOSE)
     sums, names = [], []
     for n, rows, totals in context_sums(model):
         worst = int(np.argmax(np.abs(totals - 1))) if len(totals) else 0

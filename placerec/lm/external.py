@@ -4,16 +4,16 @@ import re
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import LanguageModelError, MissingExtraError
+from placerec.errors import LanguageModelError, check_optional
 from placerec.files import read_text
 from placerec.lm.arpa import read_arpa
 
 KENLM_MAX_ORDER = 6
+KENLM_PURPOSE = "scoring with KenLM"
 Scorer = Callable[[Sequence[str]], NDArray[np.float64]]
 
 
@@ -23,7 +23,9 @@ def kenlm_scorer(path: Path | str) -> Scorer:
     Order 1, which KenLM refuses, is loaded through a temporary copy that is padded with one bigram. Raises
     MissingExtraError if KenLM is not installed, LanguageModelError for a file that it cannot load.
     """
-    kenlm = _kenlm()
+    check_optional("kenlm", KENLM_PURPOSE)
+    import kenlm
+
     config = kenlm.Config()
     config.show_progress = False
     config.arpa_complain = kenlm.ARPALoadComplain.NONE
@@ -53,13 +55,3 @@ def _padded(text: str) -> str:
     text = re.sub(r"^(ngram\s+1\s*=.*)$", r"\1\nngram 2=1", text, count=1, flags=re.MULTILINE)
     head, _, _ = text.partition("\\end\\")
     return f"{head}\\2-grams:\n-99\t<s> </s>\n\n\\end\\\n"
-
-
-def _kenlm() -> Any:
-    try:
-        import kenlm
-    except ImportError as error:
-        raise MissingExtraError(
-            "kenlm", "scoring with KenLM", "pip install kenlm (it is compiled; not on Windows, nor on Python 3.13)"
-        ) from error
-    return kenlm

@@ -211,7 +211,7 @@ def test_what_cannot_be_drawn_is_found_out_before_the_work(
         with pytest.raises(OutputError, match=r"a\.png: cannot be written"):
             command(tmp_path / "file/a.png")
         with monkeypatch.context() as context:
-            context.setitem(sys.modules, "matplotlib.figure", None)
+            context.setitem(sys.modules, "matplotlib", None)
             with pytest.raises(MissingExtraError):
                 command(tmp_path / "a.png")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

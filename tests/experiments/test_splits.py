@@ -61,6 +61,11 @@ def test_cold_saarbruecken_b_is_the_papers(prefix: str) -> None:
     assert sorted((*fold.train, *fold.test)) == sorted(names)
 
 
+def test_only_runs_1_to_3_of_part_b_train_and_test() -> None:
+    (fold,) = cold_saarbruecken_b([*PART_B, "seq3_cloudy12", "seq4_sunny23", "seq4_night4", "seq3_cloudy123"])
+    assert sorted((*fold.train, *fold.test)) == sorted(PART_B)
+
+
 @pytest.mark.parametrize(
     ("names", "told"),
     [
