@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from machines import ENVIRONMENT, Machines, machines_in, wait_until
-from small import write_images, write_tokens
+from helpers.local_dask import ENVIRONMENT, LocalDask, local_dask, wait_until
+from helpers.small_world import write_images, write_tokens
 
 from placerec import cluster as room
 from placerec.cli import commands
@@ -36,15 +36,15 @@ log = logging.getLogger("placerec.test")
 
 
 @pytest.fixture(scope="module")
-def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
-    with machines_in(tmp_path_factory.mktemp("machines")) as made:
+def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalDask]:
+    with local_dask(tmp_path_factory.mktemp("machines")) as made:
         yield made
 
 
 class Dying:
     """A cluster that loses a worker when `after` results have come, counted over all maps."""
 
-    def __init__(self, work: Far, machines: Machines, after: int) -> None:
+    def __init__(self, work: Far, machines: LocalDask, after: int) -> None:
         self._work, self._machines, self._left = work, machines, after
 
     def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
@@ -67,7 +67,7 @@ class Dying:
 
 
 @contextmanager
-def dying(machines: Machines, after: int) -> Iterator[Dying]:
+def dying(machines: LocalDask, after: int) -> Iterator[Dying]:
     """A cluster of two workers, one of which is killed; that it was is asserted."""
     with cluster(machines.have(2)) as work:
         lossy = Dying(work, machines, after)
@@ -124,7 +124,7 @@ def total(rows: Any) -> float:
 
 
 def test_results_and_notes_are_in_order_and_errors_come_through(
-    machines: Machines, caplog: pytest.LogCaptureFixture
+    machines: LocalDask, caplog: pytest.LogCaptureFixture
 ) -> None:
     with cluster(machines.have(2)) as work:
         with caplog.at_level(logging.INFO, "placerec"):
@@ -140,7 +140,7 @@ def test_results_and_notes_are_in_order_and_errors_come_through(
         assert next(work(double, iter(range(10**9)))) == 0
 
 
-def test_a_lost_worker_costs_only_its_share(machines: Machines, tmp_path: Path) -> None:
+def test_a_lost_worker_costs_only_its_share(machines: LocalDask, tmp_path: Path) -> None:
     with dying(machines, after=10) as work:
         lost = machines.workers[0].pid
         assert list(work(started, [(str(tmp_path), number) for number in range(60)])) == list(range(60))
@@ -154,7 +154,7 @@ def test_a_lost_worker_costs_only_its_share(machines: Machines, tmp_path: Path) 
     assert len(again) <= 2  # what it was at, and what lay ready there
 
 
-def test_what_is_kept_is_sent_again_when_its_worker_is_lost(machines: Machines) -> None:
+def test_what_is_kept_is_sent_again_when_its_worker_is_lost(machines: LocalDask) -> None:
     items = [np.full((3, 2), number, np.float32) for number in range(20)]
     with dying(machines, after=30) as work:
         each = each_of(items, work)
@@ -162,14 +162,14 @@ def test_what_is_kept_is_sent_again_when_its_worker_is_lost(machines: Machines) 
             assert list(each(total)) == [6.0 * number for number in range(20)]
 
 
-def test_describe(machines: Machines, images: Path, tmp_path: Path) -> None:
+def test_describe(machines: LocalDask, images: Path, tmp_path: Path) -> None:
     describe_sources([images], tmp_path / "here.npz", spec=SPEC)
     with dying(machines, after=4) as work:
         describe_sources([images], tmp_path / "there.npz", spec=SPEC, work=work)
     assert contents(tmp_path / "here.npz") == contents(tmp_path / "there.npz")
 
 
-def test_train_words(machines: Machines, images: Path, tmp_path: Path) -> None:
+def test_train_words(machines: LocalDask, images: Path, tmp_path: Path) -> None:
     train_dictionary([images], tmp_path / "here.npz", spec=SPEC, size=5, epochs=4)
     for after in (14, 40):  # nine batches are described, nine chunks go to the PCA, then nine to every epoch
         with dying(machines, after) as work:
@@ -177,7 +177,7 @@ def test_train_words(machines: Machines, images: Path, tmp_path: Path) -> None:
         assert contents(tmp_path / "here.npz") == contents(tmp_path / "there.npz")
 
 
-def test_tokenize(machines: Machines, images: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tokenize(machines: LocalDask, images: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = np.random.default_rng(0).normal(size=(60, SPEC.length)).astype(np.float32)
     Dictionary.fit(rows, spec=SPEC, size=4).save(tmp_path / "words.npz")
     tokenize([images], tmp_path / "words.npz", tmp_path / "here")
@@ -193,7 +193,7 @@ def test_tokenize(machines: Machines, images: Path, tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.parametrize("options", [Options(order=3), Options(smoothing="lidstone", markers=True, min_count=(1, 2))])
-def test_train_lm(machines: Machines, tmp_path: Path, options: Options) -> None:
+def test_train_lm(machines: LocalDask, tmp_path: Path, options: Options) -> None:
     (tmp_path / "tokens").mkdir()
     tokens = write_tokens(tmp_path / "tokens", [f"run{number}" for number in range(12)])
     train_lm([tokens], tmp_path / "here", options=options)
@@ -268,7 +268,9 @@ def test_no_certificates() -> None:
         pass
 
 
-def test_another_version(machines: Machines, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+def test_another_version(
+    machines: LocalDask, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     address = machines.have(1)
     with monkeypatch.context() as patched, caplog.at_level(logging.WARNING, "placerec"):
         patched.setattr("platform.machine", lambda: "abacus")
@@ -290,7 +292,7 @@ def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_all_workers_and_the_scheduler_are_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "JOIN", 1.0)
-    with machines_in(tmp_path) as machines:
+    with local_dask(tmp_path) as machines:
         address = machines.have(1)
         with cluster(address) as work:
             items = [(str(tmp_path), number) for number in range(100)]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.small_world import VOCABULARY, run_through, write_images
 from numpy.typing import NDArray
-from small import VOCABULARY, run_through, write_images
 
 from placerec.frames import find_sequences
 from placerec.jobs import workers

@@ -76,7 +76,7 @@ def test_the_archive_holds_all_that_its_tests_need(built: Path) -> None:
         name for name in files(built / "copy") if not re.search(r"(^|/)(__pycache__|\.\w+|placerec.egg-info)/", name)
     }
     assert found == sources | ADDED
-    assert {"bin/ngram-count", "arpa_models/README.md", "docs/changelog.md", "tests/cli/typed.py"} < found
+    assert {"bin/ngram-count", "arpa_models/README.md", "docs/changelog.md", "tests/helpers/typed_commands.py"} < found
     assert os.access(built / f"placerec-{__version__}/bin/ngram-count", os.X_OK)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from conftest import ROOT
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec import read_stream, tokenize, train_dictionary, train_lm
 from placerec.model import load_recognizer

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.small_world import VOCABULARY, write_tokens
+from helpers.training_sets import lesson_of, lessons
 from hypothesis import given
 from hypothesis import strategies as st
-from lessons import lesson_of, lessons
 from numpy.typing import NDArray
-from small import VOCABULARY, write_tokens
 
 from placerec.baselines import Lesson, decode, dubois2011, mtd, wu2009
 from placerec.baselines.tables import count_pairs

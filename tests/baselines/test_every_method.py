@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.small_world import write_tokens
+from helpers.training_sets import Ints, followed, lesson_of, lessons
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lessons import Ints, followed, lesson_of, lessons
-from small import write_tokens
 
 from placerec.baselines import METHODS, Follow, Lesson, decode, load_decoder, make_lesson
 from placerec.cli.decode import METHODS as NAMED

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.training_sets import Floats, followed, lesson_of, lessons
 from hypothesis import given
 from hypothesis import strategies as st
-from lessons import Floats, followed, lesson_of, lessons
 
 from placerec.baselines import Lesson, guillaume2011
 from placerec.baselines.lesson import log_word_p, normalised

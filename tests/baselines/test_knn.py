@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from points import clouds
+from helpers.point_clouds import clouds
 
 from placerec.baselines import knn
 from placerec.errors import MissingExtraError

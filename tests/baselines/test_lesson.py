@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lessons import lesson_of
-from small import PLACES, VOCABULARY, run_through, write_tokens
+from helpers.small_world import PLACES, VOCABULARY, run_through, write_tokens
+from helpers.training_sets import lesson_of
 
 from placerec.baselines import make_lesson, read_lesson
 from placerec.errors import ModelError

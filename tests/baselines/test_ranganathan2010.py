@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers.training_sets import Floats, Ints, followed, lesson_of, lessons
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lessons import Floats, Ints, followed, lesson_of, lessons
 
 from placerec.baselines import Lesson, ranganathan2010
 from placerec.baselines.lesson import log_word_p

@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.training_sets import Floats, followed, lesson_of, lessons
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lessons import Floats, followed, lesson_of, lessons
 
 from placerec.baselines import Lesson, second_order
 from placerec.errors import ModelError

@@ -1,7 +1,7 @@
 """Majority and naive Bayes, by hand."""
 
 import numpy as np
-from lessons import followed, lesson_of
+from helpers.training_sets import followed, lesson_of
 
 from placerec.baselines import majority, naive_bayes
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from points import PLACES, clouds
+from helpers.point_clouds import PLACES, clouds
 
 from placerec.baselines import torralba2003
 from placerec.baselines.torralba2003 import WIDTHS, best_width, draw_prototypes

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from points import clouds
+from helpers.point_clouds import clouds
 
 from placerec.baselines import ullah2008
 from placerec.baselines.views import Views

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
+from helpers.training_sets import followed, lesson_of, lessons
 from hypothesis import given
 from hypothesis import strategies as st
-from lessons import followed, lesson_of, lessons
 
 from placerec.baselines import Lesson, filliat2008, pronobis2010
 from placerec.baselines.lesson import log_word_p, normalised

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from machines import Machines, machines_in
+from helpers.local_dask import LocalDask, local_dask
 
 from placerec.cluster import cluster
 from placerec.frames import find_sequences
@@ -179,7 +179,7 @@ def jobs(sources: list[Path], rows: int, folder: Path) -> list[tuple[str, int, J
     ]
 
 
-def timed(job: Job, workers: int, machines: Machines, meter: Meter) -> Run:
+def timed(job: Job, workers: int, machines: LocalDask, meter: Meter) -> Run:
     """A run with so many workers; none: without a cluster."""
     if not workers:
         start = time.perf_counter()
@@ -200,7 +200,7 @@ def main(sources: list[Path], rounds: int, rows: int, price: float) -> None:
     listed = sum(trace.size for trace in tracemalloc.take_snapshot().traces) / max(1, len(listing))
     tracemalloc.stop()
     print(f"{len(listing)} images in {len(kept)} sequences, {statistics.mean(listing):.0f} bytes each")
-    with tempfile.TemporaryDirectory() as name, machines_in(Path(name)) as machines:
+    with tempfile.TemporaryDirectory() as name, local_dask(Path(name)) as machines:
         meter = Meter(machines.address.rpartition(":")[2])
         todo = jobs(sources, rows, Path(name))
         print(f"map of {SIDE} x {SIDE}; {rounds} rounds\n")
@@ -220,7 +220,7 @@ def main(sources: list[Path], rounds: int, rows: int, price: float) -> None:
         idle(machines)
 
 
-def idle(machines: Machines) -> None:
+def idle(machines: LocalDask) -> None:
     """What the scheduler, a worker and this process hold in memory, if psutil tells."""
     psutil = importlib.import_module("psutil")
     for title, process in (("scheduler", machines.scheduler), ("worker", machines.workers[0])):

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import cv2
 import numpy as np
-from small import VOCABULARY, run_through
+from helpers.small_world import VOCABULARY, run_through
 
 from placerec.words import write_stream, write_vocabulary
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 import pytest
-from small import PLACES, run_through, write_tokens
-from typed import SMALL, done, fails, make_words, misused, placerec
+from helpers.small_world import PLACES, run_through, write_tokens
+from helpers.typed_commands import SMALL, done, fails, make_words, misused, placerec
 
 from placerec.cli import commands
 from placerec.cli.train_lm import SMOOTHING_NAMES

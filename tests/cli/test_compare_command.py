@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec.cli import commands
 

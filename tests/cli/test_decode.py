@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from small import PLACES, write_tokens
+from helpers.small_world import PLACES, write_tokens
 
 from placerec.cli import commands
 from placerec.cli.decode import METHODS

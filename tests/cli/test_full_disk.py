@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import Result
-from small import write_tokens
-from typed import done, make_words, placerec
+from helpers.small_world import write_tokens
+from helpers.typed_commands import done, make_words, placerec
 
 if sys.platform != "win32":
     import resource

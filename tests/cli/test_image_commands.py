@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import write_images
-from typed import done, fails, make_words, misused
+from helpers.small_world import write_images
+from helpers.typed_commands import done, fails, make_words, misused
 
 from placerec.frames import read_gray
 from placerec.model import load_recognizer

@@ -14,8 +14,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from network_camera import jpegs, network_camera
-from typed import done, fails, make_words, misused
+from helpers.network_camera import jpegs, network_camera
+from helpers.typed_commands import done, fails, make_words, misused
 
 fcntl = pytest.importorskip("fcntl", reason="processes are interrupted in other ways where there is no such module")
 

@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from small import write_images
-from typed import done
+from helpers.small_world import write_images
+from helpers.typed_commands import done
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="other signals there")
 JOURNAL = ".tokens.partial-journal"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec.cli import commands
 from placerec.vision import DescriptorSpec, train_dictionary

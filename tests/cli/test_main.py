@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from small import write_images, write_tokens
+from helpers.small_world import write_images, write_tokens
 
 from placerec.cli import Commands, commands
 from placerec.model import train_lm

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded import START, STEP, compressed, cut, raw, write_bag, write_video
-from small import write_images
-from typed import SMALL, done, fails, misused, placerec
+from helpers.recordings import START, STEP, compressed, cut, raw, write_bag, write_video
+from helpers.small_world import write_images
+from helpers.typed_commands import SMALL, done, fails, misused, placerec
 
 from placerec.frames import read_gray
 from placerec.hohmm import read_beliefs

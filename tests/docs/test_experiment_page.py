@@ -10,7 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from small import write_tokens
+from helpers.small_world import write_tokens
 
 from placerec.experiments import read_config
 from placerec.experiments.results import COLUMNS, SEQUENCE_COLUMNS

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from grammar import read_grammars
+from helpers.ebnf import read_grammars
 
 from placerec.experiments.results import COLUMNS
 from placerec.lm import SMOOTHINGS

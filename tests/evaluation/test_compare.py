@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec.errors import EvaluationError, MissingExtraError, OutputError, PlacerecError
 from placerec.evaluation import compare as module

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec.errors import SourceError
 from placerec.evaluation.frame_sheet import energies

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec.errors import MissingExtraError, OutputError, VisionError
 from placerec.evaluation import look

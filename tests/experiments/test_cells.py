@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grid import write_grid
+from helpers.small_experiment import write_grid
 from hypothesis import given
 from hypothesis import strategies as st
 

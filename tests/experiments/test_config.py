@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from grid import CONFIG
+from helpers.small_experiment import CONFIG
 
 from placerec.errors import ExperimentError
 from placerec.experiments import read_config

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from grid import CONFIG, write_grid
-from small import write_images
+from helpers.small_experiment import CONFIG, write_grid
+from helpers.small_world import write_images
 
 from placerec.cli import commands
 from placerec.evaluation import evaluate_files

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from grid import CONFIG, write_grid
+from helpers.small_experiment import CONFIG, write_grid
 
 from placerec.experiments import read_config
 from placerec.experiments.figure import draw_figure

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from grid import CONFIG, write_grid
-from small import write_images, write_tokens
+from helpers.small_experiment import CONFIG, write_grid
+from helpers.small_world import write_images, write_tokens
 
 from placerec.errors import ExperimentError, OutputError, StreamError
 from placerec.experiments import cells, experiment, read_config, tokens

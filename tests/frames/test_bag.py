@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from recorded import START, STEP, Message, compressed, cut, grays, jpeg, pictures, raw, stream, write_bag
+from helpers.recordings import START, STEP, Message, compressed, cut, grays, jpeg, pictures, raw, stream, write_bag
 
 from placerec.errors import MissingExtraError, SourceError
 from placerec.frames import Reading, Sequence, find_sequences, images_at, read_gray

@@ -10,8 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from network_camera import jpegs, network_camera
-from small import write_images
+from helpers.network_camera import jpegs, network_camera
+from helpers.small_world import write_images
 
 from placerec.errors import SourceError
 from placerec.frames import Reading, find_sequences

@@ -7,9 +7,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from helpers.recordings import START, pictures, stream, write_bag, write_video
 from hypothesis import given
 from hypothesis import strategies as st
-from recorded import START, pictures, stream, write_bag, write_video
 
 from placerec.errors import SourceError
 from placerec.frames import Reading, find_sequences

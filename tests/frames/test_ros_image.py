@@ -6,8 +6,8 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from helpers.recordings import pictures, raw
 from numpy.typing import NDArray
-from recorded import pictures, raw
 
 from placerec.errors import SourceError
 from placerec.frames.image import as_gray

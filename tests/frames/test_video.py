@@ -12,8 +12,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from helpers.recordings import cut, decoded, pictures, write_video
 from numpy.typing import NDArray
-from recorded import cut, decoded, pictures, write_video
 
 from placerec.errors import SourceError
 from placerec.frames import Frame, Reading, Sequence, find_sequences, images_at

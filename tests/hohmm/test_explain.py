@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import cases
+from helpers.filter_cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_recognizer import WORDS, models_of, novelty, selections

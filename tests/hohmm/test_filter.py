@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-import plain
 import pytest
-from cases import Case, cases
+from helpers import plain_filter
+from helpers.filter_cases import Case, cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,7 +16,7 @@ from placerec.hohmm.motion import predictor
 
 @given(cases(longest=60))
 def test_the_filter_is_its_definition(case: Case) -> None:
-    expected, explained = plain.filtered(*case)
+    expected, explained = plain_filter.filtered(*case)
     found = filter_stream(case.log10_p, case.transition, case.steps)
     assert found.belief == pytest.approx(expected, abs=1e-12)
     assert found.explained.tolist() == explained

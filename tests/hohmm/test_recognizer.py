@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cases import transitions
+from helpers.filter_cases import transitions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -1,9 +1,9 @@
 """Forward-backward, fixed lag and Viterbi: equal to the enumeration of all paths."""
 
 import numpy as np
-import plain
 import pytest
-from cases import Case, cases
+from helpers import plain_filter
+from helpers.filter_cases import Case, cases
 from hypothesis import given, settings
 
 from placerec.hohmm import filter_stream, fixed_transition, smoothing
@@ -15,12 +15,12 @@ small = cases(longest=4, most=3)
 @given(small)
 def test_forward_backward_is_the_sum_over_all_paths(case: Case) -> None:
     found = smooth(case.log10_p, case.transition, case.steps)
-    assert found == pytest.approx(plain.posterior(*case), abs=1e-11)
+    assert found == pytest.approx(plain_filter.posterior(*case), abs=1e-11)
 
 
 @given(small)
 def test_viterbi_is_the_best_of_all_paths(case: Case) -> None:
-    every = plain.paths(*case)
+    every = plain_filter.paths(*case)
     path = tuple(viterbi(case.log10_p, case.transition, case.steps).tolist())
     assert every[path] == pytest.approx(max(every.values()), abs=1e-9)
 
@@ -30,7 +30,7 @@ def test_a_lagged_posterior_is_that_of_the_shorter_sequence(case: Case) -> None:
     T = len(case.log10_p)
     for known in range(T):
         cut = slice(0, known + 1)
-        shorter = plain.posterior(case.log10_p[cut], case.transition, case.elapsed[cut])
+        shorter = plain_filter.posterior(case.log10_p[cut], case.transition, case.elapsed[cut])
         now = np.arange(known + 1)
         found = smooth_lagged(case.log10_p, case.transition, case.steps, now, np.full(known + 1, known))
         assert found == pytest.approx(shorter, abs=1e-11)

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import numpy as np
-import plain
 import pytest
-from cases import transitions
+from helpers import plain_filter
+from helpers.filter_cases import transitions
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,7 +17,7 @@ kinds = st.integers(1, 4).flatmap(transitions)
 
 @given(kinds, st.integers(0, 300))
 def test_steps_are_repeated_multiplication(transition: Transition, steps: int) -> None:
-    assert transition.over(steps) == pytest.approx(plain.power(transition.matrix, steps), abs=1e-12)
+    assert transition.over(steps) == pytest.approx(plain_filter.power(transition.matrix, steps), abs=1e-12)
 
 
 @given(st.integers(1, 6), st.sampled_from([0.5, 0.9, 0.99, 1 - 1e-9, 1.0]), st.floats(0, 1e6), st.floats(0, 1e6))
@@ -54,7 +54,7 @@ def test_arrays_and_plain_floats_predict_alike(
     states = belief.copy()
     steps.advance(states, slice(None))
     for t, count in enumerate(elapsed):
-        matrix = plain.power(transition.matrix, count)
+        matrix = plain_filter.power(transition.matrix, count)
         expected = (matrix @ belief[:, t]) if backwards else (belief[:, t] @ matrix)
         assert states[:, t] == pytest.approx(expected, abs=1e-12)
         assert np.exp(logs[:, t]) == pytest.approx(expected, abs=1e-12)

@@ -4,9 +4,9 @@ import itertools
 from dataclasses import replace
 from pathlib import Path
 
-import golden
 import numpy as np
 import pytest
+from helpers import golden_runs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -51,7 +51,7 @@ def test_place_models_equal_the_reference_trainers(shared: Path) -> None:
 
 
 def test_text_models_equal_the_reference_trainers(shared: Path) -> None:
-    cases = list(golden.text_cases(shared / "srilm/golden"))
+    cases = list(golden_runs.text_cases(shared / "srilm/golden"))
     assert len(cases) > 70
     for case in cases:
         counts = count_ngrams(case.sentences, case.order, vocabulary=case.vocabulary, markers=case.markers)

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from small import PLACES, VOCABULARY, write_tokens
+from helpers.small_world import PLACES, VOCABULARY, write_tokens
 
 from placerec.errors import SourceError, StreamError
 from placerec.model import Options, read_corpus, train_lm

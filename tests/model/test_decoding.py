@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small import PLACES, write_tokens
+from helpers.small_world import PLACES, write_tokens
 
 from placerec.errors import ModelError, StreamError
 from placerec.hohmm import fixed_transition, learned_transition

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec.baselines import load_decoder
 from placerec.errors import ModelError, SourceError, StreamError

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small import PLACES, VOCABULARY, write_tokens
+from helpers.small_world import PLACES, VOCABULARY, write_tokens
 
 from placerec.errors import LanguageModelError, ModelError, OutputError, PlacerecError, StreamError
 from placerec.hohmm import read_beliefs

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import PLACES, VOCABULARY, run_through
+from helpers.small_world import PLACES, VOCABULARY, run_through
 
 from placerec.errors import LanguageModelError, ModelError, OutputError, SourceError
 from placerec.lm import SMOOTHINGS, count_ngrams, format_counts, read_arpa

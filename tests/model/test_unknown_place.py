@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small import run_through, write_tokens
+from helpers.small_world import run_through, write_tokens
 
 from placerec.errors import ModelError, StreamError
 from placerec.hohmm import read_beliefs

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.small_world import PLACES, VOCABULARY, run_through, write_tokens
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from small import PLACES, VOCABULARY, run_through, write_tokens
 
 from placerec.errors import LanguageModelError, ModelError, OutputError, PlacerecError, SourceError, StreamError
 from placerec.files import held_folder

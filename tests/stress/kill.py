@@ -22,7 +22,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from small import run_through, write_images
+from helpers.small_world import run_through, write_images
 
 from placerec.cli import commands
 from placerec.words import write_stream, write_vocabulary

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.small_world import write_images
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from small import write_images
 
 from placerec.errors import VisionError
 from placerec.frames import Sequence, find_sequences

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec.cli import commands
 from placerec.errors import OutputError

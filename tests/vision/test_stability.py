@@ -6,8 +6,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from helpers.small_world import write_images
 from numpy.typing import NDArray
-from small import write_images
 
 from placerec.errors import VisionError
 from placerec.frames import Sequence, find_sequences, read_gray

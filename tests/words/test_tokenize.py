@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import write_images
+from helpers.small_world import write_images
 
 from placerec.errors import OutputError, VisionError
 from placerec.frames import find_sequences

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from click.testing import CliRunner, Result
-from small import write_images
 
+from helpers.small_world import write_images
 from placerec.cli import commands
 
 SMALL = ("--size", 3, "--image-size", 16, "-q")

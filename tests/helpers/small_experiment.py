@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from small import write_tokens
+from helpers.small_world import write_tokens
 
 CONFIG = """
 [data]

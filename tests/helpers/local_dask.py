@@ -18,11 +18,11 @@ ENVIRONMENT = {
     **os.environ,
     # As `dask worker` has it, which begins without its own supervisor here.
     **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
-    "PYTHONPATH": os.pathsep.join([str(Path(placerec.__file__).parent.parent), str(Path(__file__).parent)]),
+    "PYTHONPATH": os.pathsep.join([str(Path(placerec.__file__).parent.parent), str(Path(__file__).parents[1])]),
 }
 
 
-class Machines:
+class LocalDask:
     """A scheduler and its workers, on this machine."""
 
     def __init__(self, folder: Path) -> None:
@@ -66,8 +66,8 @@ class Machines:
 
 
 @contextmanager
-def machines_in(folder: Path) -> Iterator[Machines]:
-    machines = Machines(folder)
+def local_dask(folder: Path) -> Iterator[LocalDask]:
+    machines = LocalDask(folder)
     try:
         yield machines
     finally:
