@@ -13,7 +13,7 @@ PACKAGE = Path(placerec.__file__).parent
 HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm", "sklearn")
 # A room imports only from rooms to its left, and these anyone may import.
 LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "experiments", "demo", "cli")
-COMMON = {"cluster", "errors", "files", "jobs", "journal", "version"}
+COMMON = {"arrays", "cluster", "errors", "files", "jobs", "journal", "version"}
 ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     # A toolkit for text alone.
     "lm": COMMON | {"lm"},
@@ -28,6 +28,7 @@ ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     "cluster": {"errors", "jobs", "version"},
     "errors": set(),
     "version": set(),
+    "arrays": set(),
     "reference": set(),
 }
 FILES = sorted(PACKAGE.rglob("*.py"))

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from held_out import Floats, filtered, part, trained
-from numpy.typing import NDArray
+from held_out import filtered, part, trained
 from single_frame import arguments, described, fold_names
 from sklearn.isotonic import IsotonicRegression
 
+from placerec.arrays import Floats, Ints
 from placerec.evaluation.confidence import reliability
 from placerec.evaluation.metrics import change_latencies
 from placerec.hohmm import fit_calibration
@@ -25,7 +25,6 @@ HEAD = """\
 | --- | --- | --- | --- | --- | --- |
 """
 POWERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.08)
-Ints = NDArray[np.int64]
 Half = list[tuple[Floats, Ints]]  # per sequence: log10 p (T, C), the true columns (T,), -1 where there is none
 Fit = Callable[[Half], Callable[[Floats], Floats]]
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats
 from placerec.hohmm import filter_stream, fixed_transition
 from placerec.lm import count_ngrams
 from placerec.model.train import Options, estimate_place
@@ -14,7 +14,6 @@ from placerec.words import Selection, Sentences, WordStream, sentences_per_place
 from placerec.words.tokenize import tokens_of
 
 SIZES, SEEDS = (10, 20), (0, 1, 2)
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

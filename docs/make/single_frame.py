@@ -12,9 +12,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec import DescriptorSpec, Dictionary, describe, find_sequences
+from placerec.arrays import Mask
 from placerec.vision import Descriptors
 
 SIZE = 20
@@ -48,12 +48,12 @@ def fold_names(frames: Descriptors, test: Sequence[str]) -> list[list[str]]:
     return [chosen] if chosen else [[name] for name in names]
 
 
-def folds(frames: Descriptors, test: Sequence[str]) -> list[NDArray[np.bool_]]:
+def folds(frames: Descriptors, test: Sequence[str]) -> list[Mask]:
     """Per fold which frames test."""
     return [np.isin(frames.sequences, names) for names in fold_names(frames, test)]
 
 
-def fitted(frames: Descriptors, tests: NDArray[np.bool_]) -> Iterator[Dictionary]:
+def fitted(frames: Descriptors, tests: Mask) -> Iterator[Dictionary]:
     """Five maps of the frames that do not test."""
     for seed in SEEDS:
         yield Dictionary.fit(frames.values[~tests], spec=frames.spec, size=SIZE, seed=seed)
@@ -64,7 +64,7 @@ def answering(dictionary: Dictionary, units: str) -> Dictionary:
     return replace(dictionary, training=replace(dictionary.training, units=units))
 
 
-def answers(dictionary: Dictionary, frames: Descriptors, tests: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def answers(dictionary: Dictionary, frames: Descriptors, tests: Mask) -> Mask:
     """Which of the labelled test frames get the right place."""
     places = np.array(frames.places)
     seen, asked = ~tests & (places != ""), tests & (places != "")
@@ -74,11 +74,11 @@ def answers(dictionary: Dictionary, frames: Descriptors, tests: NDArray[np.bool_
     # Less than one frame's vote: these decide where there is a tie, or no vote at all.
     votes += np.bincount(index) / (len(index) + 1)
     told = names[votes.argmax(axis=1)][dictionary.words(frames.values[asked])[0]]
-    right: NDArray[np.bool_] = np.equal(told, places[asked])
+    right: Mask = np.equal(told, places[asked])
     return right
 
 
-def majority(frames: Descriptors, tests: Sequence[NDArray[np.bool_]]) -> tuple[float, int]:
+def majority(frames: Descriptors, tests: Sequence[Mask]) -> tuple[float, int]:
     """The share of the most frequent place among all labelled test frames, and their number."""
     asked = [place for mask in tests for place in np.array(frames.places)[mask] if place]
     return float(np.unique(asked, return_counts=True)[1].max() / len(asked)), len(asked)

@@ -10,9 +10,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from held_out import Floats, Trained, filtered, part, trained
+from held_out import Trained, filtered, part, trained
 from single_frame import arguments, described, fold_names
 
+from placerec.arrays import Floats
 from placerec.evaluation.confidence import new_places
 from placerec.hohmm import filter_stream
 from placerec.hohmm.distances import Histogram, distance_histogram

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import EvaluationError, OutputError, at
 from placerec.files import read_text, write_text
 
@@ -33,18 +33,16 @@ class Beliefs:
     name: str  # the sequence
     places: tuple[str, ...]  # C columns
     frames: tuple[str, ...]  # n
-    times: NDArray[np.float64]  # (n,) seconds, nan where unknown
+    times: Floats  # (n,) seconds, nan where unknown
     truth: tuple[str, ...]  # n, "" where unlabelled
     words: tuple[str, ...]  # n
-    selected: NDArray[np.bool_]  # (n,)
+    selected: Mask  # (n,)
     best: tuple[str, ...]  # n
-    belief: NDArray[np.float64]  # (n, C), rows sum to 1: in each place, given that it is one of them
-    unknown: NDArray[np.float64] | None = None  # (n,) that the place is none of them; None where nobody asked
+    belief: Floats  # (n, C), rows sum to 1: in each place, given that it is one of them
+    unknown: Floats | None = None  # (n,) that the place is none of them; None where nobody asked
 
 
-def best_places(
-    places: Sequence[str], best: NDArray[np.int64], unknown: NDArray[np.float64] | None = None
-) -> tuple[str, ...]:
+def best_places(places: Sequence[str], best: Ints, unknown: Floats | None = None) -> tuple[str, ...]:
     """What to write as `best` of n frames: the place with the index `best` (n,), or UNKNOWN where that is above 1/2.
 
     unknown: (n,), or None where it is not asked for.

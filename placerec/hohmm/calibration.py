@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
-
-Floats = NDArray[np.float64]
 
 # A place that the filter rules out: no temperature could bring back a belief of 0.
 _SMALLEST_BELIEF = 1e-15
@@ -57,7 +55,7 @@ class Calibration:
         return cls(numbers[0], frames, numbers[1], numbers[2])
 
 
-def fit_calibration(belief: Floats, truth: NDArray[np.int64]) -> Calibration:
+def fit_calibration(belief: Floats, truth: Ints) -> Calibration:
     """The temperature with the least log loss on beliefs (n, C) with true places (n,), as column indices.
 
     The frames must come from sequences that trained neither the words nor the models. Raises ModelError for no frame.

@@ -5,21 +5,22 @@ the bins are an eighth of an octave wide.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+
+from placerec.arrays import Floats, Ints
 
 BINS_PER_OCTAVE = 8
 # Ascending bin -> how many distances, none of them 0.
 Histogram = dict[int, int]
 
 
-def distance_bins(distances: NDArray[np.float64]) -> NDArray[np.int64]:
+def distance_bins(distances: Floats) -> Ints:
     """int64 (k,): floor(8 log2 d) of those of `distances` (n,) that are above 0; the others, and nan, are left out."""
     known = distances[np.isfinite(distances) & (distances > 0)]
-    bins: NDArray[np.int64] = np.floor(BINS_PER_OCTAVE * np.log2(known)).astype(np.int64)
+    bins: Ints = np.floor(BINS_PER_OCTAVE * np.log2(known)).astype(np.int64)
     return bins
 
 
-def distance_histogram(distances: NDArray[np.float64]) -> Histogram:
+def distance_histogram(distances: Floats) -> Histogram:
     """How many of `distances` (n,) are in each bin."""
     bins, counts = np.unique(distance_bins(distances), return_counts=True)
     return dict(zip(bins.tolist(), counts.tolist(), strict=True))

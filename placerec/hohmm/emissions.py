@@ -5,14 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats
 from placerec.errors import ModelError
 from placerec.lm import BackoffModel
 from placerec.lm.external import Scorer
 
 MARKERS = frozenset({"<s>", "</s>", "<unk>"})
-Floats = NDArray[np.float64]
 
 
 class Emissions(Protocol):

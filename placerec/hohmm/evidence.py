@@ -4,13 +4,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import StreamError
 from placerec.hohmm.emissions import Emissions
 from placerec.words import Selection, WordStream, select
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -21,13 +19,13 @@ class Evidence:
     them in each place; `elapsed` float64 (U,): steps of the transitions since the selected word before, the first 0.
     """
 
-    selected: NDArray[np.bool_] = field(repr=False)
-    at: NDArray[np.int64] = field(repr=False)
+    selected: Mask = field(repr=False)
+    at: Ints = field(repr=False)
     log10_p: Floats = field(repr=False)
     elapsed: Floats = field(repr=False)
 
     @property
-    def updates(self) -> NDArray[np.int64]:
+    def updates(self) -> Ints:
         """How many selected words came up to each frame, int64 (n,)."""
         return np.cumsum(self.selected)
 
@@ -59,7 +57,7 @@ def evidence_in(
         yield Evidence(selected, at, log10_p, _elapsed(at, stream.times, per))
 
 
-def _elapsed(at: NDArray[np.int64], times: Floats, per: str) -> Floats:
+def _elapsed(at: Ints, times: Floats, per: str) -> Floats:
     """Steps since the update before, for updates at the frames `at` (U,); 0 for the first."""
     stamps = {"update": np.arange(len(at)), "frame": at, "second": times[at]}[per]
     return np.diff(stamps, prepend=stamps[:1]).astype(np.float64)

@@ -16,8 +16,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.hohmm import unknown
 from placerec.hohmm.evidence import Evidence
 from placerec.hohmm.filter import filter_stream
@@ -29,8 +29,6 @@ from placerec.lm import BackoffModel
 from placerec.lm.inspection import explain as explain_word
 from placerec.words import WordStream
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 # The end of the names of files with a decision a line.
 EXPLAINED = ".explain.jsonl"
 # How many selected words are asked for their contribution, and how many of them are named on either side.

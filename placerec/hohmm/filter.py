@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from math import exp, inf, log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Mask
 from placerec.hohmm.motion import Motion, matrix_predictor, motion, total
 from placerec.hohmm.transitions import Transition
 
@@ -23,8 +23,6 @@ BLOCK = 256
 UNSCALED = 8
 # Numbers in the operators of the blocks that go on side by side: they should stay in cache.
 SIDE_BY_SIDE = 1 << 15
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,10 @@ from operator import mul
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.hohmm.transitions import Transition, fade
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Predict = Callable[[list[float]], list[float]]
 # Where every place can be reached from every place with more than this, a belief that is kept as it is (not as its
 # logarithm) never loses what matters later: what underflows is 300 decades below what comes from the other places.

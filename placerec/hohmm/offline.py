@@ -3,17 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.hohmm import smoothing, unknown
 from placerec.hohmm.evidence import Evidence
 from placerec.hohmm.filter import filter_stream
 from placerec.hohmm.motion import predict_beliefs
 from placerec.hohmm.transitions import Transition
 from placerec.hohmm.unknown import UnknownModel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def believe(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
 from placerec.hohmm import unknown as new_place
 from placerec.hohmm.beliefs import UNKNOWN, Beliefs, best_places
@@ -38,7 +39,7 @@ class Belief:
     """
 
     places: tuple[str, ...]
-    probability: NDArray[np.float64]
+    probability: Floats
     word: str
     selected: bool
     unknown: float | None = None
@@ -58,9 +59,9 @@ class Belief:
 class _Decoded(NamedTuple):
     """Of n frames: beliefs (n, C), the place of each (n,), what is unknown (n,) or empty; words nobody explains."""
 
-    belief: NDArray[np.float64]
-    best: NDArray[np.int64]
-    unknown: NDArray[np.float64]
+    belief: Floats
+    best: Ints
+    unknown: Floats
     unexplained: int
 
 
@@ -253,10 +254,10 @@ class Recognizer:
         (ratio,) = new_place.evidence(model, np.array([log10_p]), self._probabilities()[None], far).tolist()
         self._chain.weigh([ratio / LN10, 0.0])
 
-    def _probabilities(self) -> NDArray[np.float64]:
+    def _probabilities(self) -> Floats:
         """The filter's own belief (C,)."""
         probability = np.array([math.exp(b) for b in self._filter.log_belief])
-        normal: NDArray[np.float64] = probability / probability.sum()
+        normal: Floats = probability / probability.sum()
         return normal
 
     def _see(self, image: NDArray[Any]) -> tuple[str, float]:

@@ -6,14 +6,11 @@ an explanation is no evidence here either.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.hohmm.filter import LN10, filter_logs
 from placerec.hohmm.motion import CHUNK, Motion, motion, predict_logs
 from placerec.hohmm.transitions import Transition
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def smooth(log10_p: Floats, transition: Transition, elapsed: Floats) -> Floats:

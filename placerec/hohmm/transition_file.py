@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from placerec.arrays import Floats
 from placerec.errors import ModelError, at
 from placerec.files import read_text
-from placerec.hohmm.transitions import Floats
 
 # Numbers written with three digits may miss 1 by as much; more is a mistake.
 _SUM_TOLERANCE = 1e-3

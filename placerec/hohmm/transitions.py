@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
 
 PER = ("update", "frame", "second")
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +81,7 @@ def fixed_transition(places: int, stay: float = 0.99, per: str = "update") -> Tr
     return Transition(matrix, per, change if change <= 1 else None)
 
 
-def learned_transition(counts: Sequence[Sequence[int]] | NDArray[np.int64]) -> Transition:
+def learned_transition(counts: Sequence[Sequence[int]] | Ints) -> Transition:
     """Transitions per frame from `counts` (C, C) of steps from one frame's place to the next one's.
 
     A Dirichlet prior of 1/C is added to every cell, so that no change is impossible.

@@ -20,13 +20,11 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.hohmm.distances import BINS_PER_OCTAVE, Histogram
 from placerec.hohmm.filter import LN10
 from placerec.hohmm.transitions import fixed_transition
-
-Floats = NDArray[np.float64]
 
 # Unknown and known are kept with the paper's p_e, in the steps of the places' transitions.
 CHAIN = fixed_transition(2, 0.99)
@@ -96,9 +94,7 @@ def unknown_model(
     return UnknownModel(vocabulary, news, _distance_model(histograms or (), runs, measured))
 
 
-def measure_distances(
-    distances: Floats, places: NDArray[np.int64], histograms: Sequence[Histogram]
-) -> tuple[float, float] | None:
+def measure_distances(distances: Floats, places: Ints, histograms: Sequence[Histogram]) -> tuple[float, float] | None:
     """Shift and variance of log2 distance against the training means, over frames (n,) of known places.
 
     `places`: (n,) int64, the true place's index in `histograms`. Frames without a distance are left out; None if fewer

@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text, write_text
 from placerec.lm.arpa_text import LOG_ZERO, first_lines
 from placerec.lm.backoff import BackoffModel, score_ids
-from placerec.lm.logs import Ints, Mask, Singles
 from placerec.lm.trie import Trie, Vocabulary
 
 log = logging.getLogger(__name__)

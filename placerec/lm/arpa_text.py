@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Ints, Mask, Singles
+from placerec.arrays import Ints, Mask, Singles
 
 LOG_ZERO = -99.0
 Cells = NDArray[np.uint64]

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.lm.logs import Ints, Singles
+from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.trie import Trie
 
 
@@ -42,7 +41,7 @@ class BackoffModel:
         recent = list(history)[-(self.order - 1) :] if self.order > 1 else []
         return float(self.score([*recent, word])[-1])
 
-    def score(self, words: Sequence[str]) -> NDArray[np.float64]:
+    def score(self, words: Sequence[str]) -> Floats:
         """log10 p float64 (T,) of each of T words after those before it: empty first context, no markers.
 
         The sum over a sequence is its log10 probability. Vectorised: one binary search per order for all words.
@@ -56,7 +55,7 @@ class BackoffModel:
         return ids
 
 
-def score_ids(model: BackoffModel, ids: Ints) -> tuple[NDArray[np.float64], Ints]:
+def score_ids(model: BackoffModel, ids: Ints) -> tuple[Floats, Ints]:
     """log10 p float64 (T,) and the order that answered int64 (T,) (0: not even a unigram) for word numbers (T,)."""
     rows = ids
     log10_p = np.where(ids >= 0, model.log10_ps[0].astype(np.float64)[ids], -np.inf) if len(ids) else np.zeros(0)

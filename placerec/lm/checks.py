@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import LanguageModelError, check_optional
 from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
@@ -53,7 +53,7 @@ class ModelCheck:
         return f"{self.path}: order {self.order}: {sums}; {scores}: {verdict}"
 
 
-def context_sums(model: BackoffModel) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.float64]]]:
+def context_sums(model: BackoffModel) -> Iterator[tuple[int, Ints, Floats]]:
     """Per order: n, the rows (m,) of order n-1 that are contexts, and the sum (m,) over all words of p(word | context).
 
     <s> is not predicted and left out; the empty context comes first, as row 0 of order 0.
@@ -85,7 +85,7 @@ def power_of_ten(value: float) -> float:
     return 10.0**value if value < _LARGEST_POWER else math.inf
 
 
-def _backed_off_p(model: BackoffModel, n: int, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _backed_off_p(model: BackoffModel, n: int, rows: Mask) -> Floats:
     """p float64 (m_n,) of the masked n-grams of order n without their first word, word by word; 0 elsewhere."""
     p = np.zeros(len(rows))
     texts = model.trie.texts(n) if rows.any() else []
@@ -144,6 +144,6 @@ def check_model(path: Path | str, *, tokens: int = 2000, seed: int = 0) -> Model
     )
 
 
-def _largest_difference(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> float:
+def _largest_difference(ours: Floats, theirs: Floats) -> float:
     zero = (ours < LOG_ZERO) & (theirs < LOG_ZERO)
     return float(np.abs(np.where(zero, 0.0, ours) - np.where(zero, 0.0, theirs)).max(initial=0.0))

@@ -6,14 +6,12 @@ Sources: sections 4.4, 5.2 and 5.3 of our SRILM specification.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Ints, Mask
 from placerec.errors import LanguageModelError
-from placerec.lm.counts import Mask, NgramCounts
-from placerec.lm.logs import EPSILON, Ints
+from placerec.lm.counts import NgramCounts
+from placerec.lm.logs import EPSILON
 from placerec.lm.trie import per_context
-
-Floats = NDArray[np.float64]
 
 
 def counts_of_counts(counts: NgramCounts, n: int, top: int, event: Mask, meta: Ints) -> Ints:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from placerec.arrays import Ints
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text
 from placerec.jobs import Map
 from placerec.lm.counts import NgramCounts, add_counts, count_text, numbered, tabulate
-from placerec.lm.logs import Ints
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.stored_text import Numbers, StoredText
 from placerec.lm.trie import Vocabulary

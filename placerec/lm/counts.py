@@ -7,17 +7,13 @@ from functools import partial
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.lm.logs import Ints
+from placerec.arrays import Floats, Ints, Mask
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.row_index import RowIndex
 from placerec.lm.stored_text import BLOCK, Block, Numbers, StoredText
 from placerec.lm.trie import Trie, Vocabulary, build_trie, endings
 from placerec.lm.windows import changes, distinct_windows
-
-Mask = NDArray[np.bool_]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.gather import trie_of
-from placerec.lm.logs import EPSILON, Floats, Ints, Mask, Singles, log10, p_of
+from placerec.lm.logs import EPSILON, log10, p_of
 from placerec.lm.trace import Trace
 from placerec.lm.trie import Trie, Vocabulary, build_trie, endings, per_context
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placerec.lm.logs import LN10, Floats, Ints, Mask, Singles, log10, p_of
+from placerec.arrays import Floats, Ints, Mask, Singles
+from placerec.lm.logs import LN10, log10, p_of
 
 
 def mixed(log10_ps: Singles, weights: Floats) -> Singles:

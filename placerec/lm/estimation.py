@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.errors import LanguageModelError
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.counts import Mask, NgramCounts
-from placerec.lm.discounts import Context, Floats, Rule
+from placerec.lm.counts import NgramCounts
+from placerec.lm.discounts import Context, Rule
 from placerec.lm.draft import Draft, insert_prefixes, weigh_contexts
-from placerec.lm.logs import EPSILON, Ints, Singles, log10, p_of
+from placerec.lm.logs import EPSILON, log10, p_of
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import Smoothing
 from placerec.lm.trace import SILENT, Trace

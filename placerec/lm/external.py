@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats
 from placerec.errors import LanguageModelError, check_optional
 from placerec.files import read_text
 from placerec.lm.arpa import read_arpa
 
 KENLM_MAX_ORDER = 6
 KENLM_PURPOSE = "scoring with KenLM"
-Scorer = Callable[[Sequence[str]], NDArray[np.float64]]
+Scorer = Callable[[Sequence[str]], Floats]
 
 
 def kenlm_scorer(path: Path | str) -> Scorer:
@@ -44,7 +44,7 @@ def kenlm_scorer(path: Path | str) -> Scorer:
         except OSError as error:
             raise LanguageModelError(f"{path}: KenLM cannot load it: {str(error).splitlines()[0]}") from error
 
-    def score(words: Sequence[str]) -> NDArray[np.float64]:
+    def score(words: Sequence[str]) -> Floats:
         return np.array([p for p, _, _ in model.full_scores(" ".join(words), bos=False, eos=False)], np.float64)
 
     return score

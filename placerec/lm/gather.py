@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placerec.lm.logs import Ints
+from placerec.arrays import Ints
 from placerec.lm.row_index import RowIndex
 from placerec.lm.trie import Trie, Vocabulary, build_trie, endings, runs
 

@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Singles, p_of
+from placerec.arrays import Floats, Singles
+from placerec.lm.logs import p_of
 
 LONGEST = 50000
 

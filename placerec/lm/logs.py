@@ -1,14 +1,11 @@
 """Log probabilities as models store them: float32 to the base of 10; and the arrays that go with them."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from placerec.arrays import Floats, Singles
 
 EPSILON = 3e-6
 LN10 = 2.30258509299404568402
-Ints = NDArray[np.int64]
-Singles = NDArray[np.float32]
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def p_of(log10_p: Singles) -> Floats:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Ints, Mask, Singles
+from placerec.arrays import Ints, Mask, Singles
 from placerec.lm.row_index import RowIndex
 
 

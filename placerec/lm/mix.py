@@ -7,10 +7,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from placerec.arrays import Singles
 from placerec.errors import LanguageModelError
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.draft import Draft, drafts_of, reweigh
-from placerec.lm.logs import Singles, log10, p_of
+from placerec.lm.logs import log10, p_of
 from placerec.lm.markers import SENTENCE_START, UNKNOWN
 from placerec.lm.trace import SILENT, Trace
 

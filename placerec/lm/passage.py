@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Ints, Mask, Singles
+from placerec.arrays import Ints, Mask, Singles
 from placerec.lm.row_index import RowIndex
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import EPSILON, LN10, Floats, Ints, Mask, Singles
+from placerec.arrays import Floats, Ints, Mask, Singles
+from placerec.lm.logs import EPSILON, LN10
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 
 if TYPE_CHECKING:

@@ -5,9 +5,10 @@ Sections 11.2 and 11.3 of our SRILM specification.
 
 import numpy as np
 
+from placerec.arrays import Floats, Ints
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.draft import Draft, context_masses, drafts_of, insert_prefixes, reweigh, settle_masses
-from placerec.lm.logs import EPSILON, LN10, Floats, Ints, p_of
+from placerec.lm.logs import EPSILON, LN10, p_of
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.passage import joint_of_rows
 from placerec.lm.trace import SILENT, Trace

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Ints
+from placerec.arrays import Ints
 
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)
 # Slots for each key, up to so many bits: where that is still in a cache, more room leaves fewer keys to one slot.

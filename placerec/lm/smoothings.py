@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from placerec.arrays import Mask
 from placerec.errors import LanguageModelError
 from placerec.lm.count_statistics import (
     counts_of_counts,
@@ -16,7 +17,7 @@ from placerec.lm.count_statistics import (
     left_neighbour_counts,
     modified_kneser_ney_discounts,
 )
-from placerec.lm.counts import Mask, NgramCounts
+from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import Discount, absolute, additive, lidstone, modified_kneser_ney, witten_bell
 
 T = TypeVar("T")

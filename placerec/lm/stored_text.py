@@ -11,8 +11,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Ints
 from placerec.errors import OutputError
-from placerec.lm.logs import Ints
 
 Numbers = NDArray[Any]
 # Words in a block: sorting what fits in a cache is faster.

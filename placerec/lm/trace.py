@@ -3,7 +3,7 @@
 Contexts of order n are given as rows of order n-1 (row 0 stands for the empty context where n is 1).
 """
 
-from placerec.lm.logs import Floats, Ints, Mask, Singles
+from placerec.arrays import Floats, Ints, Mask, Singles
 
 
 class Trace:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Ints
+from placerec.arrays import Floats, Ints, Mask
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Vocabulary:
         """Word numbers int64 (T,) of T words, -1 for a word that is not listed."""
         return np.fromiter((self.index.get(word, -1) for word in words), np.int64, len(words))
 
-    def mask(self, words: Iterable[str]) -> NDArray[np.bool_]:
+    def mask(self, words: Iterable[str]) -> Mask:
         """bool (V,), true at those of `words` that are listed."""
         mask = np.zeros(len(self), bool)
         mask[[self.index[word] for word in words if word in self.index]] = True
@@ -125,7 +125,7 @@ class Trie:
             rank[by_word] = np.arange(len(by_word))
             yield rank
 
-    def keep(self, masks: Sequence[NDArray[np.bool_]]) -> "Trie":
+    def keep(self, masks: Sequence[Mask]) -> "Trie":
         """The trie of the rows that `masks`, bool (m_n,) per order, name; prefixes of kept rows must be kept."""
         words = self.vocabulary.words
         vocabulary = Vocabulary.of(words[number] for number in np.flatnonzero(masks[0]).tolist())
@@ -145,7 +145,7 @@ def runs(values: Ints) -> tuple[Ints, Ints]:
     return values[new], np.cumsum(new) - 1
 
 
-def per_context(prefix: Ints, size: int, values: NDArray[Any] | None = None) -> NDArray[np.float64]:
+def per_context(prefix: Ints, size: int, values: NDArray[Any] | None = None) -> Floats:
     """Sums float64 (size,) of `values` (default: ones) over the rows that share a prefix row."""
     return np.bincount(prefix, weights=values, minlength=size).astype(np.float64)
 

@@ -9,14 +9,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.logs import Ints
 from placerec.lm.row_index import RowIndex
 from placerec.lm.trie import Trie, Vocabulary, build_trie, endings, runs
 
-Floats = NDArray[np.float64]
 # Words that are looked up together: the work space stays in cache, and memory does not grow with the text.
 CHUNK = 1 << 16
 # Up to so many possible n-grams of one order a table of them all finds a row; beyond, a hash table.

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from functools import partial, reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Ints, Mask
 from placerec.lm.ahead import work_ahead
-from placerec.lm.logs import Ints
 from placerec.lm.stored_text import Block, Numbers, StoredText
 
 # Windows that may wait for being merged.
@@ -85,7 +84,7 @@ def _packed(symbols: Ints, lengths: Ints, span: range, bits: int) -> Ints:
     return packed
 
 
-def changes(values: Ints) -> NDArray[np.bool_]:
+def changes(values: Ints) -> Mask:
     """Where a value differs from the one before, bool (m,); the first one does."""
     changed = np.ones(len(values), bool)
     np.not_equal(values[1:], values[:-1], out=changed[1:])

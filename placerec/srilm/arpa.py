@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from placerec.arrays import Ints
 from placerec.lm.draft import Draft
 from placerec.lm.gather import trie_of
-from placerec.lm.logs import Ints
 from placerec.srilm.arpa_block import Block
 from placerec.srilm.arpa_reader import Reader
 from placerec.srilm.context_order import NEVER, ContextTimes

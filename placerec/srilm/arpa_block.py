@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Ints, Mask, Singles
+from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.srilm.fields import LONGEST_NAME, Fields, Packed, split_lines, with_odd_bytes
 
 LOG_ZERO = -99.0

@@ -7,7 +7,7 @@ from itertools import chain
 
 import numpy as np
 
-from placerec.lm.logs import Ints, Mask
+from placerec.arrays import Ints, Mask
 from placerec.srilm.arpa_block import LOG_ZERO, Block, parse_block
 from placerec.srilm.fields import Fields, NameTable
 from placerec.srilm.options import bounded_int, leading_float

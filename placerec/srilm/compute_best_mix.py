@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placerec.lm.mix_weights import Floats, best_mix
+from placerec.arrays import Floats
+from placerec.lm.mix_weights import best_mix
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import SrilmError, Streams, exit_status
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from placerec.lm.logs import Ints
+from placerec.arrays import Ints
 from placerec.lm.trie import Trie
 from placerec.srilm.hashing import table_order
 from placerec.srilm.messages import ContextOrder

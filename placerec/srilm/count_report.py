@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Ints, p_of
+from placerec.arrays import Floats, Ints
+from placerec.lm.logs import p_of
 from placerec.lm.markers import SENTENCE_END
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals

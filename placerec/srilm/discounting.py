@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from placerec.arrays import Ints, Mask
 from placerec.errors import LanguageModelError
 from placerec.lm.count_statistics import (
     counts_of_counts,
@@ -14,7 +15,7 @@ from placerec.lm.count_statistics import (
     left_neighbour_counts,
     modified_kneser_ney_discounts,
 )
-from placerec.lm.counts import Mask, NgramCounts
+from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import (
     Discount,
     Rule,
@@ -25,7 +26,6 @@ from placerec.lm.discounts import (
     natural,
     witten_bell,
 )
-from placerec.lm.logs import Ints
 from placerec.srilm.options import Parsed, leading_float, leading_int
 from placerec.srilm.streams import SrilmError, Streams, tokens
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.counts import NgramCounts
-from placerec.lm.logs import Floats, Ints, Singles
 from placerec.lm.trie import build_trie, runs
 from placerec.srilm.first_seen import FirstSeen
 from placerec.srilm.hashing import walk_order

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Ints
+from placerec.arrays import Ints
 from placerec.lm.row_index import RowIndex
 
 Packed = NDArray[np.uint64]

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from placerec.arrays import Ints
 from placerec.lm.counts import NgramCounts
-from placerec.lm.logs import Ints
 from placerec.lm.trie import Trie, Vocabulary
 from placerec.srilm.counts_file import Table
 from placerec.srilm.hashing import first_positions, walk_order

@@ -13,12 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Ints, Mask
 from placerec.lm.counts import occurrences
-from placerec.lm.logs import Ints
 from placerec.lm.stored_text import StoredText
 from placerec.lm.trie import Trie
 
-Mask = NDArray[np.bool_]
 _SMALL = 8
 
 

@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from placerec.lm.logs import LN10, Floats, Ints, Mask, Singles
+from placerec.arrays import Floats, Ints, Mask, Singles
+from placerec.lm.logs import LN10
 from placerec.lm.trace import Trace
 from placerec.lm.trie import Trie
 from placerec.srilm.streams import Streams

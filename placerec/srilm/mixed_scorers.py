@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from placerec.arrays import Ints, Singles
 from placerec.lm.dynamic import Cache, loglinear, mixed, posteriors, with_cache
-from placerec.lm.logs import Ints, Singles, p_of
+from placerec.lm.logs import p_of
 from placerec.lm.passage import Passage, used_context
 from placerec.srilm.scorers import Model, ModelView, Scored, Scorer, View, event_numbers
 from placerec.srilm.vocabulary import WordList

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from placerec.lm.logs import Singles
+from placerec.arrays import Singles
 from placerec.lm.lookup import Lookup
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lm.logs import Ints
+from placerec.arrays import Ints
 from placerec.srilm.vocabulary import WordList
 
 Bytes = NDArray[np.uint8]

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from placerec.lm.logs import Floats, Ints, Mask, p_of
+from placerec.arrays import Floats, Ints, Mask
+from placerec.lm.logs import p_of
 from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
 from placerec.srilm.scorers import Scored, Scorer, View, event_numbers

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from placerec.lm.logs import Ints, Mask, Singles
+from placerec.arrays import Ints, Mask, Singles
 from placerec.lm.lookup import Lookup
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage, answers, joint, look_up, look_up_others, read_passage, spread

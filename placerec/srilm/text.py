@@ -7,9 +7,9 @@ from itertools import chain
 
 import numpy as np
 
+from placerec.arrays import Ints
 from placerec.lm.ahead import work_ahead
 from placerec.lm.counts import NgramCounts, count_text
-from placerec.lm.logs import Ints
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.stored_text import BLOCK, Numbers, StoredText
 from placerec.srilm.counts_file import parse_count

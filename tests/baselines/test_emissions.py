@@ -12,15 +12,14 @@ from helpers.small_world import VOCABULARY, write_tokens
 from helpers.training_sets import lesson_of, lessons
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats
 from placerec.baselines import Lesson, decode, dubois2011, mtd, wu2009
 from placerec.baselines.tables import count_pairs
 from placerec.hohmm import Emissions
 from placerec.model import Options, train_lm
 from placerec.model import decode as decode_with_models
 
-Floats = NDArray[np.float64]
 FITS: tuple[Callable[[Lesson], Emissions], ...] = (wu2009.fit, dubois2011.fit, mtd.fit)
 # What an ARPA file keeps of a logarithm.
 ROUNDED = 1e-6

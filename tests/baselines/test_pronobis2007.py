@@ -4,8 +4,8 @@ from functools import partial
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from placerec.arrays import Ints
 from placerec.baselines.pronobis2007 import MARGINS, best_margin, cascade, fit
 
 # Two places, three words a dictionary. The first tells little: w0 3:1, w1 1:1, w2 1:3. The second tells more.
@@ -41,7 +41,7 @@ def test_the_ends_of_the_margins_ask_never_and_always(margin: float, asked: int)
     assert sum(step(unit, lambda: 0).consulted for unit in range(3)) == asked
 
 
-def noisy(seed: int, reliable: float) -> tuple[list[NDArray[np.int64]], NDArray[np.int64], NDArray[np.int64]]:
+def noisy(seed: int, reliable: float) -> tuple[list[Ints], Ints, Ints]:
     """Units in either dictionary (of three words), truth and sequences; the second is right with `reliable`."""
     rng = np.random.default_rng(seed)
     truth = rng.integers(0, 3, 90)

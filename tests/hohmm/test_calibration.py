@@ -7,12 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
 from placerec.hohmm.calibration import Calibration, fit_calibration
 
-Floats = NDArray[np.float64]
 beliefs = arrays(np.float64, (5, 3), elements=st.floats(0, 1)).filter(lambda rows: bool((rows.sum(axis=1) > 0).all()))
 
 
@@ -21,7 +20,7 @@ def normal(rows: Floats) -> Floats:
     return whole
 
 
-def loss(belief: Floats, truth: NDArray[np.int64]) -> float:
+def loss(belief: Floats, truth: Ints) -> float:
     return float(-np.log(belief[np.arange(len(truth)), truth]).mean())
 
 
@@ -54,7 +53,7 @@ def test_no_decision_changes_and_rows_sum_to_one(rows: Floats, temperature: floa
 
 
 @given(beliefs, arrays(np.int64, 5, elements=st.integers(0, 2)))
-def test_no_other_temperature_is_better(rows: Floats, truth: NDArray[np.int64]) -> None:
+def test_no_other_temperature_is_better(rows: Floats, truth: Ints) -> None:
     belief = normal(rows)
     found = fit_calibration(belief, truth)
 

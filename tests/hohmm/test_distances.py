@@ -3,8 +3,8 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats
 from placerec.hohmm.distances import add_histograms, distance_bins, distance_histogram
 
 DISTANCES = st.lists(st.floats(1e-9, 1e9), max_size=30).map(np.array)
@@ -20,15 +20,13 @@ def test_what_is_no_distance_is_left_out() -> None:
 
 
 @given(DISTANCES)
-def test_every_distance_is_inside_its_bin(distances: NDArray[np.float64]) -> None:
+def test_every_distance_is_inside_its_bin(distances: Floats) -> None:
     for distance, b in zip(distances, distance_bins(distances), strict=True):
         assert 2 ** (b / 8) * (1 - 1e-12) <= distance <= 2 ** ((b + 1) / 8) * (1 + 1e-12)
 
 
 @given(DISTANCES, DISTANCES)
-def test_the_sum_is_the_histogram_of_all_and_taking_away_undoes_it(
-    first: NDArray[np.float64], second: NDArray[np.float64]
-) -> None:
+def test_the_sum_is_the_histogram_of_all_and_taking_away_undoes_it(first: Floats, second: Floats) -> None:
     a, b = distance_histogram(first), distance_histogram(second)
     both = add_histograms(a, b)
     assert list(both.items()) == list(distance_histogram(np.concatenate([first, second])).items())

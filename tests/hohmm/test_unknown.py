@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from placerec.hohmm.filter import Floats, filter_stream
+from placerec.arrays import Floats
+from placerec.hohmm.filter import filter_stream
 from placerec.hohmm.smoothing import smooth
 from placerec.hohmm.unknown import (
     CHAIN,

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from placerec.arrays import Singles
 from placerec.lm import arpa_text
 from placerec.lm.arpa import format_arpa, read_arpa
 from placerec.lm.arpa_text import PackedLines, PlainLines, first_lines, number_cells
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.logs import Singles
 from placerec.lm.trie import Trie, Vocabulary
 
 SINGLES = st.floats(width=32, allow_nan=False)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from placerec.arrays import Singles
 from placerec.lm.dynamic import Cache, loglinear, mixed, posteriors, with_cache
-from placerec.lm.logs import Singles
 
 
 def logs(*rows: list[float]) -> Singles:

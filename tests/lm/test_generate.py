@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from placerec.arrays import Singles
 from placerec.lm.generate import draw_word, generate
-from placerec.lm.logs import Singles
 
 P = np.array([0.1, 0.6, 0.3])
 

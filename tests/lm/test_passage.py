@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from placerec.arrays import Ints
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
 from placerec.lm.draft import Draft, drafts_of
 from placerec.lm.gather import trie_of
-from placerec.lm.logs import Ints
 from placerec.lm.passage import (
     Passage,
     answers,

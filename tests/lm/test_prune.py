@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from placerec.arrays import Ints
 from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
 from placerec.lm.checks import context_sums
 from placerec.lm.draft import drafts_of, reweigh
-from placerec.lm.logs import Ints
 from placerec.lm.prune import prune, prune_improbable, pruned
 from placerec.lm.trace import SILENT, Trace
 
