@@ -62,6 +62,7 @@ def test_what_the_method_page_names_exists(name: str) -> None:
     module, inside = f"placerec.{name}", list[str]()
     while not (ROOT / module.replace(".", "/")).with_suffix(".py").exists():
         module, _, last = module.rpartition(".")
+        assert module, f"no file of the package is meant by {name}"
         inside.insert(0, last)
     assert inside, "a function is meant, not a module"
     found = import_module(module)
