@@ -1,6 +1,7 @@
 """The package as a whole: what importing it costs, what it exports, and which room may know which."""
 
 import ast
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 import placerec
 
 PACKAGE = Path(placerec.__file__).parent
+ROOT = PACKAGE.parent
 HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm", "sklearn")
 # A room imports only from rooms to its left, and these anyone may import.
 LINE = ("frames", "vision", "words", "lm", "hohmm", "model", "baselines", "evaluation", "experiments", "demo", "cli")
@@ -61,6 +63,22 @@ def loaded_by(statement: str) -> set[str]:
 def test_there_are_files_to_look_at() -> None:
     assert len(FILES) > 40
     assert {room_of(path) for path in FILES} - {"__init__", "__main__"} <= set(ALLOWED)
+
+
+def test_nothing_that_git_ignores_is_in_the_history() -> None:
+    """An environment once committed stays in every clone, also when a later commit removes it."""
+    git = shutil.which("git")
+    if git is None or not (ROOT / ".git").exists():
+        pytest.skip("these sources are no clone")
+
+    def run(*command: str) -> str:
+        return subprocess.run([git, *command], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+
+    tracked = run("ls-files", "--cached", "--ignored", "--exclude-standard").splitlines()
+    if tracked:
+        commit = run("log", "--diff-filter=A", "-1", "--format=%h %s", "--", tracked[0])
+        remedy = "take it out: git rebase --onto main COMMIT, or git rm --cached and git commit --amend"
+        pytest.fail(f"{len(tracked)} ignored files are tracked, {tracked[0]} since the commit {commit!r}; {remedy}")
 
 
 @pytest.mark.parametrize("statement", ["import placerec", "import placerec.cli", "import placerec.errors"])
