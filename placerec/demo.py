@@ -3,12 +3,11 @@
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec.errors import check_optional
 from placerec.evaluation import (
@@ -32,7 +31,7 @@ from placerec.hohmm import Beliefs, write_beliefs
 from placerec.lab import render_lab
 from placerec.lm.inspection import format_inspection, inspect_model
 from placerec.model import Options, load_recognizer, read_corpus, train_model
-from placerec.vision import Descriptors, Dictionary, describe
+from placerec.vision import Dictionary, describe
 from placerec.words import read_stream
 from placerec.words.tokenize import tokens_of, write_tokens
 
@@ -82,7 +81,7 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
                 results.append(DemoResult(smoothing, order, evaluate(beliefs)))
                 best = beliefs if (smoothing, order) == ("witten-bell", 2) else best
         contact_sheet(_typical_frames(sequences), folder / "laboratory.png")
-        words = word_table(_only(descriptors, ~training), dictionary)
+        words = word_table(descriptors.take(~training), dictionary)
         draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title="The words of run 3")
         plot_evaluation(best, evaluate(best), folder / "beliefs.png")
         write_text(
@@ -110,16 +109,6 @@ def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
     for found in beliefs:
         write_beliefs(folder / "beliefs" / f"{smoothing}-{order}" / f"{found.name}.tsv", found)
     return beliefs
-
-
-def _only(descriptors: Descriptors, rows: NDArray[np.bool_]) -> Descriptors:
-    """The descriptors of some frames."""
-    kept = np.flatnonzero(rows).tolist()
-    frames, sequences, places = (
-        tuple(names[row] for row in kept) for names in (descriptors.frames, descriptors.sequences, descriptors.places)
-    )
-    values, times = descriptors.values[rows], descriptors.times[rows]
-    return replace(descriptors, values=values, times=times, frames=frames, sequences=sequences, places=places)
 
 
 def format_results(results: Sequence[DemoResult]) -> str:

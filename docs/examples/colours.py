@@ -48,12 +48,12 @@ def main() -> None:
     (options.out / "vocab.txt").write_text("\n".join(vocabulary) + "\n", encoding="utf-8")
     for each in sequences:
         nearest, distances = vq(described[each.name], typical)
-        stream = WordStream(
-            name=each.name,
-            frames=tuple(frame.name for frame in each.frames),
-            times=np.array([frame.time for frame in each.frames]),
-            places=tuple(frame.place for frame in each.frames),
-            words=tuple(vocabulary[k] for k in nearest),
+        stream = WordStream.of(
+            each.name,
+            words=[vocabulary[k] for k in nearest],
+            places=[frame.place for frame in each.frames],
+            frames=[frame.name for frame in each.frames],
+            times=[frame.time for frame in each.frames],
             distances=distances,
         )
         write_stream(stream, options.out / f"{each.name}.tsv")

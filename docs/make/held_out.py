@@ -1,7 +1,7 @@
 """What the programs here share: words and models of some sequences, and what they say of others."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,14 +36,7 @@ def part(frames: Descriptors, names: Sequence[str], without: str = "") -> Descri
     """The frames of some sequences, those of the place `without` left out."""
     pairs = zip(frames.sequences, frames.places, strict=True)
     rows = [i for i, (name, place) in enumerate(pairs) if name in names and not (without and place == without)]
-    return replace(
-        frames,
-        values=frames.values[rows],
-        frames=tuple(frames.frames[i] for i in rows),
-        sequences=tuple(frames.sequences[i] for i in rows),
-        times=frames.times[rows],
-        places=tuple(frames.places[i] for i in rows),
-    )
+    return frames.take(rows)
 
 
 def trained(training: Descriptors, tests: Descriptors) -> Iterator[Trained]:

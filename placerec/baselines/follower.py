@@ -8,7 +8,7 @@ import numpy as np
 
 from placerec.baselines.lesson import Follow
 from placerec.errors import ModelError, StreamError
-from placerec.hohmm import Belief, Beliefs, best_places
+from placerec.hohmm import Belief, Beliefs
 from placerec.hohmm.recognizer import warn_of_strange_words
 from placerec.words import Selection, WordStream, selector
 
@@ -94,19 +94,7 @@ class Follower:
             except ModelError as error:
                 raise StreamError(f"{stream.name}: frame {stream.frames[i]!r}: {error}") from error
             selected[i], belief[i], unknown[i] = answer.selected, answer.probability, answer.unknown or 0
-        asked = unknown if self.unknown else None
-        return Beliefs(
-            stream.name,
-            self.places,
-            stream.frames,
-            stream.times,
-            stream.places,
-            stream.words,
-            selected,
-            best_places(self.places, belief.argmax(axis=1), asked),
-            belief,
-            asked,
-        )
+        return Beliefs.of(stream, self.places, belief, selected=selected, unknown=unknown if self.unknown else None)
 
     def _believed(self, word: str, selected: bool) -> Belief:
         if not self.unknown:

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from placerec.baselines import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
 from placerec.baselines.views import PointFollow, Views
 from placerec.evaluation.material import Look, digest
-from placerec.hohmm import Beliefs, Recognizer, best_places
+from placerec.hohmm import Beliefs, Recognizer
 from placerec.lm.union import unite_models
 from placerec.model import Decoder, Decoding, Options, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
 from placerec.version import __version__
-from placerec.words import Selection, WordStream, place_steps, sentences_per_place
+from placerec.words import Selection, place_steps, sentences_per_place
 
 FIXED = f"{HOHMM}-fixed"
 # What `hohmm` is without the words before: its models' unigrams, its smoothing and transitions.
@@ -149,9 +149,8 @@ def _decoder(name: str, models: PlaceModels) -> Follow:
 def _views(contest: Contest) -> Views:
     """The labelled training frames as points."""
     places = contest.places
-    column = {place: number for number, place in enumerate(places)} | {"": -1}
     streams = contest.look.streams[: contest.training]
-    truth = np.array([column[place] for stream in streams for place in stream.places], np.int64)
+    truth = np.concatenate([stream.table.places.codes(places) for stream in streams])
     sequences = np.repeat(np.arange(len(streams)), [len(stream) for stream in streams])
     points = np.concatenate(contest.look.points[: contest.training]).astype(np.float64)
     steps = np.sum([place_steps(stream, places) for stream in streams], axis=0)
@@ -164,9 +163,8 @@ def _run_cascade(contest: Contest) -> Run:
     if contest.again is None:
         raise ValueError("the cascade needs a second dictionary")
     looks = (contest.look, contest.again)
-    column = {place: number for number, place in enumerate(contest.places)} | {"": -1}
     training = range(contest.training)
-    truth = np.array([column[p] for i in training for p in contest.look.streams[i].places], np.int64)
+    truth = np.concatenate([contest.look.streams[i].table.places.codes(contest.places) for i in training])
     sequences = np.repeat(training, [len(contest.look.streams[i]) for i in training])
     units = [np.concatenate([one.units(i) for i in training])[truth >= 0] for one in looks]
     words = [len(one.dictionary.vocabulary) for one in looks]
@@ -203,19 +201,5 @@ def _timed(follow: Follow, contest: Contest, inputs: Sequence[Any]) -> Run:
             found.append(rows)
         fastest = min(fastest, spent)
     streams = [contest.look.streams[i] for i in contest.tests]
-    beliefs = [_beliefs(stream, contest.places, np.array(rows)) for stream, rows in zip(streams, found, strict=True)]
+    beliefs = [Beliefs.of(stream, contest.places, np.array(rows)) for stream, rows in zip(streams, found, strict=True)]
     return Run(beliefs, 1e6 * fastest / sum(map(len, inputs)))
-
-
-def _beliefs(stream: WordStream, places: tuple[str, ...], belief: Floats) -> Beliefs:
-    return Beliefs(
-        stream.name,
-        places,
-        stream.frames,
-        stream.times,
-        stream.places,
-        stream.words,
-        np.ones(len(stream), bool),
-        best_places(places, belief.argmax(axis=1)),
-        belief,
-    )

@@ -18,6 +18,7 @@ from placerec.files import read_text, write_text
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import files_of, images_at
 from placerec.frames.sequence import Gray
+from placerec.frames.table import FrameTable
 from placerec.version import __version__
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe, descriptor, save_descriptors
 from placerec.vision.external import read_rows
@@ -96,11 +97,11 @@ def _described(
     for batch in _batches(missing):
         tell = None if progress is None else lambda n, _, start=done: progress(start + n, total)
         both = describe([sequence for sequence, _ in batch], spec, progress=tell)
-        rows = both.rows_by_sequence()
+        rows = both.table.by_sequence()
         for sequence, path in batch:
             if sequence.name not in rows:
                 raise EvaluationError(f"{sequence.source}: none of its images can be read; leave the sequence out")
-            save_descriptors(_part(both, rows[sequence.name]), path)
+            save_descriptors(both.take(rows[sequence.name]), path)
         done += sum(len(sequence.frames) for sequence, _ in batch)
     return [_restored(sequence, spec, path) for sequence, path in zip(sequences, paths, strict=True)]
 
@@ -131,36 +132,11 @@ def _batches(missing: Sequence[tuple[FrameSequence, Path]]) -> Iterator[list[tup
         yield batch
 
 
-def _part(found: Descriptors, rows: NDArray[np.int64]) -> Descriptors:
-    def of(texts: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(texts[row] for row in rows.tolist())
-
-    return Descriptors(
-        found.spec,
-        found.values[rows],
-        of(found.frames),
-        of(found.sequences),
-        found.times[rows],
-        of(found.places),
-        0,
-        0,
-    )
-
-
 def _restored(sequence: FrameSequence, spec: DescriptorSpec, path: Path) -> Descriptors:
     """What the file holds, with the sequence's present labels and times."""
     values, kept = read_rows(path, [(sequence.name, frame.name) for frame in sequence.frames])
     found = [sequence.frames[k] for k in kept]
-    return Descriptors(
-        spec,
-        values,
-        tuple(frame.name for frame in found),
-        (sequence.name,) * len(found),
-        np.array([frame.time for frame in found], np.float64),
-        tuple(frame.place for frame in found),
-        len(sequence.frames) - len(found),
-        0,
-    )
+    return Descriptors(spec, values, FrameTable.of_frames(sequence.name, found), len(sequence.frames) - len(found))
 
 
 def _dictionary(values: NDArray[np.float32], spec: DescriptorSpec, size: int, seed: int, cache: Path) -> Dictionary:

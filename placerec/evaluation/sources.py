@@ -27,7 +27,7 @@ def evaluate_files(sources: Iterable[Path | str], *, plot: Path | str | None = N
     paths = _files([Path(source) for source in sources])
     beliefs = [_read(path) for path in paths]
     names = unique_names([(one.name, path) for one, path in zip(beliefs, paths, strict=True)], EvaluationError)
-    beliefs = [replace(one, name=name) for one, name in zip(beliefs, names, strict=True)]
+    beliefs = [replace(one, stream=one.stream.renamed(name)) for one, name in zip(beliefs, names, strict=True)]
     evaluation = evaluate(beliefs)
     if plot is not None:
         plot_evaluation(beliefs, evaluation, plot)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
-from placerec.evaluation.metrics import codes
 from placerec.evaluation.summary import percent, shorten
 from placerec.frames import Sequence, images_at
 from placerec.frames.sequence import Gray
+from placerec.frames.table import FrameTable
 from placerec.vision import Descriptors, Dictionary
 from placerec.vision.pca import project
 from placerec.vision.som import best_units
@@ -43,8 +43,7 @@ class WordTable:
     u_matrix: NDArray[np.float64]
     to_dead: int
     is_training: bool  # the frames look like those that trained the map: as many of them hit each unit
-    sequence_names: tuple[str, ...]  # (n,) of every frame
-    frame_names: tuple[str, ...]
+    looked_at: FrameTable  # the n frames
 
     @property
     def place(self) -> NDArray[np.int64]:
@@ -64,8 +63,8 @@ class WordTable:
         """The object that `show-words --json` prints: None where there is no frame or no label."""
         labelled = int(self.votes.sum())
         return {
-            "frames": len(self.frame_names),
-            "sequences": len(set(self.sequence_names)),
+            "frames": len(self.looked_at),
+            "sequences": len(self.looked_at.by_sequence()),
             "labelled": labelled,
             "to_dead_units": self.to_dead,
             "in_majority_place": self.agreeing / labelled if labelled else None,
@@ -85,8 +84,8 @@ class WordTable:
             "frames": int(self.frames[unit]),
             "place": self.places[place] if labelled else None,
             "share": round(float(self.share[unit]), 6) if labelled else None,
-            "typical_sequence": self.sequence_names[frame] if found else None,
-            "typical_frame": self.frame_names[frame] if found else None,
+            "typical_sequence": self.looked_at.sequences[frame] if found else None,
+            "typical_frame": self.looked_at.names[frame] if found else None,
             "distance": round(float(self.distances[unit]), 6) if found else None,
         }
 
@@ -102,7 +101,7 @@ def word_table(descriptors: Descriptors, dictionary: Dictionary) -> WordTable:
     units, distances = dictionary.words(descriptors.values)
     nearest, _ = best_units(project(descriptors.values, dictionary.pca), dictionary.codebook)
     places = tuple(sorted(set(descriptors.places) - {""}))
-    place = codes(descriptors.places, places)
+    place = descriptors.table.places.codes(places)
     labelled = place >= 0
     votes = np.bincount(units[labelled] * len(places) + place[labelled], minlength=count * len(places))
     # Sorted by unit and distance, the first row of each unit is its nearest.
@@ -124,8 +123,7 @@ def word_table(descriptors: Descriptors, dictionary: Dictionary) -> WordTable:
         u_matrix(dictionary.codebook).ravel(),
         int((dictionary.hits[nearest] == 0).sum()),
         np.array_equal(np.bincount(nearest, minlength=count), dictionary.hits),
-        descriptors.sequences,
-        descriptors.frames,
+        descriptors.table,
     )
 
 
@@ -138,7 +136,7 @@ def typical_images(
     """
     wanted = range(len(table.words)) if units is None else units
     unit_of = {
-        (table.sequence_names[frame], table.frame_names[frame]): unit
+        (table.looked_at.sequences[frame], table.looked_at.names[frame]): unit
         for unit in wanted
         if (frame := int(table.typical[unit])) >= 0
     }
@@ -176,7 +174,7 @@ def u_matrix(codebook: NDArray[np.float32]) -> NDArray[np.float64]:
 
 def word_sentences(table: WordTable) -> list[str]:
     """What there is to say of the words in general, in a few sentences."""
-    frames, sequences = len(table.frame_names), len(set(table.sequence_names))
+    frames, sequences = len(table.looked_at), len(table.looked_at.by_sequence())
     live = int((table.hits > 0).sum())
     seen = int((table.frames > 0).sum())
     which = "all" if live == len(table.words) else str(live)
@@ -216,7 +214,7 @@ def _dead_sentence(table: WordTable) -> str:
     what = f"{_some(dead, 'unit')} that no training frame hit"
     if not table.to_dead:
         return f"{what}: none of these frames is nearest to one{', for they trained the map' * table.is_training}."
-    reach = f"{percent(table.to_dead / len(table.frame_names))} of the frames"
+    reach = f"{percent(table.to_dead / len(table.looked_at))} of the frames"
     if table.units == "live":
         return f"{what}: {reach} are nearest to one, and get the word of the nearest live unit instead."
     return f"{what}: {reach} are nearest to one and have it as word, which no language model has seen."

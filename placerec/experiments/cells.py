@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from placerec.evaluation import evaluate
 from placerec.evaluation.metrics import change_latencies, codes, right_frames
 from placerec.experiments import cache
-from placerec.hohmm import Beliefs, Emissions, Transition, best_places, fixed_transition, learned_transition
+from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition
 from placerec.hohmm.evidence import evidence_in
 from placerec.hohmm.offline import believe
 from placerec.hohmm.recognizer import warn_of_strange_words
@@ -157,16 +157,7 @@ def _filtered(
     parts = evidence_in(stream, union, listed, selection=selection, per=transition.per, max_gap=None)
     evidence = next(parts)
     belief, _ = believe(evidence, transition)
-    return _beliefs(stream, tuple(corpus.sentences), evidence.selected, belief)
-
-
-def _beliefs(
-    stream: WordStream, places: tuple[str, ...], selected: NDArray[np.bool_], belief: NDArray[np.float64]
-) -> Beliefs:
-    best = best_places(places, belief.argmax(axis=1))
-    return Beliefs(
-        stream.name, places, stream.frames, stream.times, stream.places, stream.words, selected, best, belief
-    )
+    return Beliefs.of(stream, tuple(corpus.sentences), belief, selected=evidence.selected)
 
 
 def _frame_wise(streams: _Streams, smoothing: str) -> dict[str, int]:

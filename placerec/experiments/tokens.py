@@ -3,11 +3,10 @@
 import glob
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec.errors import ExperimentError, VisionError
 from placerec.evaluation.word_sheet import draw_word_sheet
@@ -17,6 +16,7 @@ from placerec.frames import Sequence as FrameSequence
 from placerec.frames import files_of, find_sequences
 from placerec.frames.folder import natural_key
 from placerec.frames.recordings import is_recording
+from placerec.frames.table import FrameTable
 from placerec.jobs import Map, Progress
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe
 from placerec.vision.storage import read_npz, write_npz
@@ -42,16 +42,9 @@ class Described:
         """The descriptors of the frames that could be read, with the labels that the sequence has now."""
         arrays, meta = read_npz(self.kept, ("descriptors", "rows"))
         frames = [self.sequence.frames[row] for row in arrays["rows"].tolist()]
-        return Descriptors(
-            SPEC,
-            arrays["descriptors"],
-            tuple(frame.name for frame in frames),
-            (self.sequence.name,) * len(frames),
-            np.array([frame.time for frame in frames], np.float64),
-            tuple(frame.place for frame in frames),
-            len(self.sequence.frames) - len(frames),
-            int(meta["constant"]),
-        )
+        table = FrameTable.of_frames(self.sequence.name, frames)
+        skipped, constant = len(self.sequence.frames) - len(frames), int(meta["constant"])
+        return Descriptors(SPEC, arrays["descriptors"], table, skipped, constant)
 
 
 def find_images(globs: Sequence[str], folder: Path) -> list[FrameSequence]:
@@ -142,33 +135,20 @@ class TokensJob:
 
 def make_tokens(job: TokensJob) -> None:
     """Learn the words and write the token streams, as `train-words` and `tokenize` do."""
-    training = _joined([one.load() for one in job.train])
+    training = Descriptors.concat([one.load() for one in job.train])
     try:
         dictionary = Dictionary.load(job.words)
     except VisionError:
         dictionary = Dictionary.fit(training.values, spec=SPEC, size=job.size, seed=job.seed, units=job.units)
         dictionary.save(job.words)
-    streams = tokens_of(training, dictionary) + tokens_of(_joined([one.load() for one in job.test]), dictionary)
+    test = Descriptors.concat([one.load() for one in job.test])
+    streams = tokens_of(training, dictionary) + tokens_of(test, dictionary)
     write_tokens(streams, dictionary, job.folder)
-
-
-def _joined(parts: Sequence[Descriptors]) -> Descriptors:
-    values: NDArray[np.float32] = np.concatenate([part.values for part in parts])
-    return replace(
-        parts[0],
-        values=values,
-        frames=tuple(name for part in parts for name in part.frames),
-        sequences=tuple(name for part in parts for name in part.sequences),
-        times=np.concatenate([part.times for part in parts]),
-        places=tuple(place for part in parts for place in part.places),
-        skipped=sum(part.skipped for part in parts),
-        constant=sum(part.constant for part in parts),
-    )
 
 
 def draw_words(job: TokensJob, path: Path) -> None:
     """Draw what the words look like among the test frames, as `show-words` does."""
     sequences = [one.sequence for one in job.test]
-    words = word_table(_joined([one.load() for one in job.test]), Dictionary.load(job.words))
+    words = word_table(Descriptors.concat([one.load() for one in job.test]), Dictionary.load(job.words))
     title = f"The words of S = {job.size}, seed {job.seed}, among the test frames"
     draw_word_sheet(words, typical_images(words, sequences), path, title=title)

@@ -4,17 +4,19 @@ import logging
 import math
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
 from placerec.frames import bag, cold, idol, video
-from placerec.frames.listed import FileFrames, Labels
 from placerec.frames.places import PlaceList
+from placerec.frames.sequence import Frame
+from placerec.frames.table import FrameTable
 
 log = logging.getLogger(__name__)
 
@@ -30,6 +32,40 @@ class Listing:
     images: tuple[str, ...]
     recordings: tuple[str, ...]
     folders: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FileFrames(Sequence[Frame]):
+    """Frames that are files of one folder, each made of its row in the table when it is asked for."""
+
+    folder: Path
+    table: FrameTable
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def __iter__(self) -> Iterator[Frame]:
+        table = self.table
+        for name, time, place in zip(table.names, table.times.tolist(), table.places, strict=True):
+            yield Frame(name, time, place, self.folder / name)
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> "FileFrames": ...
+
+    def __getitem__(self, index: int | slice) -> "Frame | FileFrames":
+        if isinstance(index, slice):
+            return FileFrames(self.folder, self.table.take(index))
+        name = self.table.names[index]
+        return Frame(name, float(self.table.times[index]), self.table.places[index], self.folder / name)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, FileFrames) and (self.folder, self.table) == (other.folder, other.table)
+
+    def __hash__(self) -> int:
+        return hash((self.folder, len(self)))
 
 
 def natural_key(name: str) -> tuple[str, str]:
@@ -97,11 +133,13 @@ def read_frames(folder: Path, images: Iterable[str], *, labels: PlaceList | None
         names, times = [names[row] for row in by_time], times[by_time]
     if labels:
         _report(labels, names)
-        return FileFrames(folder, names, times, (labels.places.get(name, "") for name in names))
-    places = Labels(named.place if (named := idol.parse_name(name)) else place for name in names)
-    if not any(places):
-        log.info("%s: no places.lst; its frames have no label", folder)
-    return FileFrames(folder, names, times, places)
+        places = [labels.places.get(name, "") for name in names]
+    else:
+        places = [named.place if (named := idol.parse_name(name)) else place for name in names]
+        if not any(places):
+            log.info("%s: no places.lst; its frames have no label", folder)
+    # What the sequence will be called is not known yet.
+    return FileFrames(folder, FrameTable.of("", names, times, places))
 
 
 def _times(folder: Path, images: Sequence[str]) -> NDArray[np.float64]:

@@ -3,7 +3,6 @@
 from placerec.hohmm.beliefs import (
     Beliefs,
     belief_rows,
-    best_places,
     format_header,
     format_row,
     read_beliefs,
@@ -27,7 +26,6 @@ __all__ = [
     "SeparateEmissions",
     "Transition",
     "belief_rows",
-    "best_places",
     "filter_stream",
     "fit_calibration",
     "fixed_transition",

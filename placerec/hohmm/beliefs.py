@@ -8,8 +8,8 @@ them, stands beside them: they hold given that it is not, and `best` is `unknown
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import EvaluationError, OutputError, at
 from placerec.files import read_text, write_text
+from placerec.words import WordStream
 
 COLUMNS = ("frame", "time", "place", "word", "selected", "best")
 UNKNOWN = "unknown"
@@ -28,29 +29,68 @@ _SUM_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Beliefs:
-    """What was believed about every frame of one sequence; n frames, C places."""
+    """What was believed about every frame of one sequence, n frames, and each of C places.
 
-    name: str  # the sequence
-    places: tuple[str, ...]  # C columns
-    frames: tuple[str, ...]  # n
-    times: Floats  # (n,) seconds, nan where unknown
-    truth: tuple[str, ...]  # n, "" where unlabelled
-    words: tuple[str, ...]  # n
-    selected: Mask  # (n,)
-    best: tuple[str, ...]  # n
-    belief: Floats  # (n, C), rows sum to 1: in each place, given that it is one of them
-    unknown: Floats | None = None  # (n,) that the place is none of them; None where nobody asked
-
-
-def best_places(places: Sequence[str], best: Ints, unknown: Floats | None = None) -> tuple[str, ...]:
-    """What to write as `best` of n frames: the place with the index `best` (n,), or UNKNOWN where that is above 1/2.
-
-    unknown: (n,), or None where it is not asked for.
+    `stream`: the sequence, its words and true places. `selected` bool (n,): the frames that the filter took in.
+    `best`: the most probable place of each frame, or UNKNOWN. `belief` float64 (n, C), rows sum to 1: in each place,
+    given that it is one of them. `unknown` float64 (n,): that the place is none of them; None where nobody asked.
     """
-    names = [places[index] for index in best.tolist()]
-    if unknown is None:
-        return tuple(names)
-    return tuple(UNKNOWN if new else place for place, new in zip(names, (unknown > 0.5).tolist(), strict=True))
+
+    stream: WordStream
+    places: tuple[str, ...]
+    selected: Mask = field(repr=False)
+    best: tuple[str, ...] = field(repr=False)
+    belief: Floats = field(repr=False)
+    unknown: Floats | None = field(default=None, repr=False)
+
+    @staticmethod
+    def of(
+        stream: WordStream,
+        places: tuple[str, ...],
+        belief: Floats,
+        *,
+        selected: Mask | None = None,
+        best: Ints | None = None,
+        unknown: Floats | None = None,
+    ) -> "Beliefs":
+        """The beliefs (n, C) about the frames of a stream; `best` is UNKNOWN where `unknown` (n,) is above 1/2.
+
+        `selected` bool (n,): all frames if left out. `best` int64 (n,): a column each, the most probable if left out.
+        """
+        columns = belief.argmax(axis=1) if best is None else best
+        names = [places[column] for column in columns.tolist()]
+        if unknown is not None:
+            names = [UNKNOWN if new else name for name, new in zip(names, (unknown > 0.5).tolist(), strict=True)]
+        taken = np.ones(len(stream), bool) if selected is None else selected
+        return Beliefs(stream, places, taken, tuple(names), belief, unknown)
+
+    def __len__(self) -> int:
+        return len(self.stream)
+
+    @property
+    def name(self) -> str:
+        """The sequence."""
+        return self.stream.name
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The names of the frames."""
+        return self.stream.frames
+
+    @property
+    def times(self) -> Floats:
+        """Seconds, float64 (n,), nan where unknown."""
+        return self.stream.times
+
+    @property
+    def truth(self) -> tuple[str, ...]:
+        """The true places, "" where the frame has no label."""
+        return self.stream.places
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The word of each frame."""
+        return self.stream.words
 
 
 def format_header(places: Iterable[str], *, unknown: bool = False) -> str:
@@ -130,13 +170,16 @@ def parse_beliefs(text: str, *, name: str, source: Path | str) -> Beliefs:
             rows.append(_row(line.split("\t"), header, places, answers))
         except ValueError as error:
             raise EvaluationError(at(source, number, str(error))) from None
+    stream = WordStream.of(
+        name,
+        [row.word for row in rows],
+        [row.place for row in rows],
+        frames=[row.frame for row in rows],
+        times=[row.time for row in rows],
+    )
     return Beliefs(
-        name=name,
-        places=places,
-        frames=tuple(row.frame for row in rows),
-        times=np.array([row.time for row in rows], dtype=np.float64),
-        truth=tuple(row.place for row in rows),
-        words=tuple(row.word for row in rows),
+        stream,
+        places,
         selected=np.array([row.selected for row in rows], dtype=np.bool_),
         best=tuple(row.best for row in rows),
         belief=np.array([row.belief for row in rows], dtype=np.float64).reshape(len(rows), len(places)),
@@ -157,9 +200,9 @@ class _Row(NamedTuple):
 
 def _line(fields: Iterable[str]) -> str:
     fields = tuple(fields)
-    for field in fields:
-        if "\t" in field or "\n" in field or "\r" in field:
-            raise OutputError(f"{field!r} holds a tab or a line end, which a beliefs file cannot hold; rename it")
+    for text in fields:
+        if "\t" in text or "\n" in text or "\r" in text:
+            raise OutputError(f"{text!r} holds a tab or a line end, which a beliefs file cannot hold; rename it")
     return "\t".join(fields)
 
 

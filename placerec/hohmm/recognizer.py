@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
 from placerec.hohmm import unknown as new_place
-from placerec.hohmm.beliefs import UNKNOWN, Beliefs, best_places
+from placerec.hohmm.beliefs import UNKNOWN, Beliefs
 from placerec.hohmm.calibration import Calibration
 from placerec.hohmm.emissions import Emissions, common_words
 from placerec.hohmm.evidence import Evidence, evidence_in
@@ -180,17 +180,13 @@ class Recognizer:
         if unexplained:
             log.warning("%s: words that no place explains: %d left the prediction as it was", stream.name, unexplained)
         unknown = None if self.unknown is None else np.concatenate([part.unknown for part in decoded])
-        return Beliefs(
-            stream.name,
+        return Beliefs.of(
+            stream,
             self.places,
-            stream.frames,
-            stream.times,
-            stream.places,
-            stream.words,
-            np.concatenate([part.selected for part in parts]),
-            best_places(self.places, np.concatenate([part.best for part in decoded]), unknown),
             np.concatenate([part.belief for part in decoded]),
-            unknown,
+            selected=np.concatenate([part.selected for part in parts]),
+            best=np.concatenate([part.best for part in decoded]),
+            unknown=unknown,
         )
 
     def evidence(self, stream: WordStream) -> Iterator[Evidence]:

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
@@ -74,7 +74,7 @@ def read_streams(sources: Iterable[Path | str]) -> list[WordStream]:
 def _each_stream(files: Sequence[Path]) -> Iterator[WordStream]:
     names = unique_names([(stream_name(path), path) for path in files], StreamError)
     for name, path in zip(names, files, strict=True):
-        yield replace(read_stream(path), name=name)
+        yield read_stream(path).renamed(name)
 
 
 def holds_sentences(sources: Sequence[Path | str]) -> bool:

@@ -1,10 +1,10 @@
 """Sequences -> descriptors: every frame is read, described and forgotten."""
 
 import logging
-from array import array
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Sequence as Ordered
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError
-from placerec.frames import Frame, Sequence
-from placerec.frames.listed import Labels, Texts
+from placerec.frames import Sequence
+from placerec.frames.table import FrameTable, Rows
 from placerec.jobs import Map, Progress
 from placerec.journal import Journal
 from placerec.vision.external import read_rows
 from placerec.vision.gist import Floats
 from placerec.vision.spec import DescriptorSpec, check_describes_images
-from placerec.vision.storage import Column, Pieces, text_column, write_npz
+from placerec.vision.storage import Pieces, text_column, write_npz
 from placerec.vision.work import Answer, Tally, answers, describe_batch
 
 log = logging.getLogger(__name__)
@@ -29,26 +29,50 @@ log = logging.getLogger(__name__)
 class Descriptors:
     """Descriptors of n frames, in the order of the sequences and of time.
 
-    values: float32 (n, d), a row of zeros for a constant image; frames, sequences, places: names (n,), place ""
-    where unlabelled; times: float64 (n,) seconds, nan where unknown. skipped: frames that could not be read and are
-    not among the n; constant: images without any structure, which are.
+    values: float32 (n, d), a row of zeros for a constant image; table: the frames. skipped: frames that could not be
+    read and are not among the n; constant: images without any structure, which are.
     """
 
     spec: DescriptorSpec
     values: NDArray[np.float32]
-    frames: tuple[str, ...]
-    sequences: tuple[str, ...]
-    times: NDArray[np.float64]
-    places: tuple[str, ...]
-    skipped: int
-    constant: int
+    table: FrameTable
+    skipped: int = 0
+    constant: int = 0
 
-    def rows_by_sequence(self) -> dict[str, NDArray[np.int64]]:
-        """Sequence name -> the indices of its frames, both in order; a sequence without readable images is absent."""
-        rows: dict[str, list[int]] = {}
-        for row, name in enumerate(self.sequences):
-            rows.setdefault(name, []).append(row)
-        return {name: np.array(its, np.int64) for name, its in rows.items()}
+    @cached_property
+    def frames(self) -> tuple[str, ...]:
+        """The names of the frames."""
+        return tuple(self.table.names)
+
+    @cached_property
+    def sequences(self) -> tuple[str, ...]:
+        """The name of each frame's sequence."""
+        return tuple(self.table.sequences)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Seconds, float64 (n,), nan where unknown."""
+        return self.table.times
+
+    @cached_property
+    def places(self) -> tuple[str, ...]:
+        """The labels, "" where there is none."""
+        return tuple(self.table.places)
+
+    def take(self, rows: Rows) -> "Descriptors":
+        """Those of some frames, given by numbers, bool (n,) or a slice; what was skipped or constant is not counted."""
+        return Descriptors(self.spec, self.values[rows], self.table.take(rows))
+
+    @staticmethod
+    def concat(parts: Ordered["Descriptors"]) -> "Descriptors":
+        """Those of all parts, one part behind the other; `parts` holds at least one, all of one kind."""
+        return Descriptors(
+            parts[0].spec,
+            np.concatenate([part.values for part in parts]),
+            FrameTable.concat(part.table for part in parts),
+            sum(part.skipped for part in parts),
+            sum(part.constant for part in parts),
+        )
 
 
 def describe(
@@ -66,82 +90,63 @@ def describe(
     for threads; the result is the same with any. `progress` is called with frames done and in all. Raises VisionError
     if no image can be read, or if the matrix cannot be used or holds other descriptors than `spec` wants.
     """
-    sequences, listing = list(sequences), Listing()
+    sequences = list(sequences)
     if matrix is not None:
-        spec, values = _given(sequences, spec, Path(matrix), listing)
-    else:
-        spec = spec or DescriptorSpec()
-        values = np.concatenate(list(described(sequences, spec, listing, work=work, progress=progress)))
-    return Descriptors(spec, values, *listing.columns(), listing.tally.skipped, listing.tally.constant)
-
-
-@dataclass
-class Listing:
-    """The frames that have a descriptor, as they are found, in little memory."""
-
-    frames: Texts = field(default_factory=Texts)
-    sequences: Labels = field(default_factory=Labels)
-    times: "array[float]" = field(default_factory=lambda: array("d"))
-    places: Labels = field(default_factory=Labels)
-    tally: Tally = field(default_factory=Tally)
-
-    def add(self, sequence: str, frame: Frame) -> None:
-        """One frame more."""
-        self.frames.append(frame.name)
-        self.sequences.append(sequence)
-        self.times.append(frame.time)
-        self.places.append(frame.place)
-
-    def columns(self) -> tuple[tuple[str, ...], tuple[str, ...], NDArray[np.float64], tuple[str, ...]]:
-        """Frames, sequences, times and places, as `Descriptors` has them."""
-        return tuple(self.frames), tuple(self.sequences), np.array(self.times, np.float64), tuple(self.places)
+        return _given(sequences, spec, Path(matrix))
+    spec, tally = spec or DescriptorSpec(), Tally()
+    tables, values = zip(*described(sequences, spec, tally, work=work, progress=progress), strict=True)
+    return Descriptors(spec, np.concatenate(values), FrameTable.concat(tables), tally.skipped, tally.constant)
 
 
 def described(
     sequences: list[Sequence],
     spec: DescriptorSpec,
-    listing: Listing,
+    tally: Tally,
     *,
     work: Map | None = None,
     journal: Journal | None = None,
     progress: Progress | None = None,
-) -> Iterator[Floats]:
-    """The descriptors (m, spec.length) of a batch of frames after the other, which are listed; else as `describe`."""
+) -> Iterator[tuple[FrameTable, Floats]]:
+    """Batch after batch the frames that have a descriptor, and these (m, spec.length); else as `describe`."""
     check_describes_images(spec)
-    function, tally = partial(describe_batch, spec), listing.tally
+    function = partial(describe_batch, spec)
     for batch, answer in answers(
         function, sequences, spec, tally, key="describe", work=work, journal=journal, progress=progress
     ):
-        for k in answer.kept.tolist():
-            listing.add(batch.sequence, batch.frames[k])
-        yield answer.arrays["values"]
+        yield FrameTable.of_frames(batch.sequence, answer.frames_of(batch)), answer.arrays["values"]
     tally.close()
 
 
-def list_described(
+@dataclass(frozen=True, eq=False)
+class KeptDescriptors:
+    """Descriptors that are in a journal, and not in memory: the frames that have one."""
+
+    spec: DescriptorSpec
+    table: FrameTable
+    tally: Tally
+    journal: Journal
+
+    def pieces(self) -> Iterator[Floats]:
+        """The descriptors, batch by batch, again at every call."""
+        for content in self.journal.contents():
+            yield Answer.unpack(content).arrays["values"]
+
+
+def keep_described(
     sequences: list[Sequence],
     spec: DescriptorSpec,
     journal: Journal,
     work: Map | None = None,
     progress: Progress | None = None,
-) -> Listing:
-    """The frames that have a descriptor; the descriptors are left in the journal, for `kept_rows`."""
-    listing = Listing()
-    for _ in described(sequences, spec, listing, work=work, journal=journal, progress=progress):
-        pass
-    return listing
+) -> KeptDescriptors:
+    """Describe the frames as `describe` does; the descriptors are left in the journal."""
+    tally = Tally()
+    found = described(sequences, spec, tally, work=work, journal=journal, progress=progress)
+    return KeptDescriptors(spec, FrameTable.concat(table for table, _ in found), tally, journal)
 
 
-def kept_rows(journal: Journal) -> Iterator[Floats]:
-    """The descriptors that `described` left in a journal, batch by batch."""
-    for content in journal.contents():
-        yield Answer.unpack(content).arrays["values"]
-
-
-def _given(
-    sequences: list[Sequence], spec: DescriptorSpec | None, matrix: Path, listing: Listing
-) -> tuple[DescriptorSpec, Floats]:
-    """The specification and the rows of a matrix; the frames that have one are listed."""
+def _given(sequences: list[Sequence], spec: DescriptorSpec | None, matrix: Path) -> Descriptors:
+    """The rows of a matrix, and the frames that have one."""
     named = [(sequence.name, frame) for sequence in sequences for frame in sequence.frames]
     if spec is not None and spec.kind != "npy":
         raise VisionError(f"{matrix}: is not wanted, for the dictionary is of {spec.kind} descriptors; leave it out")
@@ -150,44 +155,29 @@ def _given(
         raise VisionError(f"{matrix}: has a row for none of the {len(named)} frames; name the matrix of these sources")
     if spec is not None and values.shape[1] != spec.columns:
         raise VisionError(f"{matrix}: has rows of {values.shape[1]} values, and the dictionary's have {spec.columns}")
-    for k in sorted(set(range(len(named))) - set(kept)):
+    skipped = sorted(set(range(len(named))) - set(kept))
+    for k in skipped:
         log.warning("%s: has no row for %s; the frame is skipped", matrix, named[k][1].path)
-    for k in kept:
-        listing.add(*named[k])
-    listing.tally = Tally(len(named), len(named) - len(kept))
-    log.info("%d frames described, %d skipped; rows of %s", len(kept), listing.tally.skipped, matrix)
-    return spec or DescriptorSpec(kind="npy", columns=values.shape[1]), values
+    table = FrameTable.concat(FrameTable.of_frames(sequence.name, sequence.frames) for sequence in sequences)
+    log.info("%d frames described, %d skipped; rows of %s", len(kept), len(skipped), matrix)
+    spec = spec or DescriptorSpec(kind="npy", columns=values.shape[1])
+    return Descriptors(spec, values, table.take(kept), len(skipped))
 
 
-def save_descriptors(descriptors: Descriptors, path: Path | str) -> None:
+def save_descriptors(descriptors: Descriptors | KeptDescriptors, path: Path | str) -> None:
     """Write descriptors.npz: `descriptors` (n, d) float32, `frames`, `sequences`, `times`, `places` and JSON `meta`."""
-    given = descriptors
-    columns = given.frames, given.sequences, given.times, given.places
-    _save(path, given.spec, given.values, columns, given.skipped, given.constant)
-
-
-def save_kept(journal: Journal, listing: Listing, spec: DescriptorSpec, path: Path | str) -> None:
-    """`save_descriptors` of what `described` left in a journal; only the listing is in memory."""
-    values = Pieces((len(listing.frames), spec.length), lambda: kept_rows(journal))
-    columns = listing.frames, listing.sequences, np.array(listing.times), listing.places
-    _save(path, spec, values, columns, listing.tally.skipped, listing.tally.constant)
-
-
-def _save(
-    path: Path | str,
-    spec: DescriptorSpec,
-    values: Floats | Pieces,
-    columns: tuple[Column, Column, NDArray[np.float64], Column],
-    skipped: int,
-    constant: int,
-) -> None:
-    frames, sequences, times, places = columns
+    table, spec = descriptors.table, descriptors.spec
+    if isinstance(descriptors, Descriptors):
+        values: Floats | Pieces = descriptors.values
+        counts: Descriptors | Tally = descriptors
+    else:
+        values, counts = Pieces((len(table), spec.length), descriptors.pieces), descriptors.tally
     arrays: dict[str, Any] = {
         "descriptors": values,
-        "frames": text_column(frames),
-        "sequences": text_column(sequences),
-        "times": times,
-        "places": text_column(places),
+        "frames": text_column(table.names),
+        "sequences": text_column(table.sequences),
+        "times": table.times,
+        "places": text_column(table.places),
     }
     meta = {"format": "placerec-descriptors", "version": 1, "descriptor": spec.as_dict()}
-    write_npz(Path(path), arrays, meta | {"skipped": skipped, "constant": constant})
+    write_npz(Path(path), arrays, meta | {"skipped": counts.skipped, "constant": counts.constant})

@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from placerec.frames import Reading, Sequence, files_of, find_sequences
 from placerec.jobs import Map, Progress
 from placerec.journal import open_journal
 from placerec.vision.chunks import Source
-from placerec.vision.describe import describe, kept_rows, list_described, save_descriptors, save_kept
+from placerec.vision.describe import describe, keep_described, save_descriptors
 from placerec.vision.dictionary import Dictionary, Quality
 from placerec.vision.quality import MapQuality
 from placerec.vision.som import WIDTH
@@ -46,8 +45,7 @@ def describe_sources(
             save_descriptors(describe(sequences, spec, matrix=matrix), unfinished)
             return
         spec = spec or DescriptorSpec()
-        listing = list_described(sequences, spec, journal, work, progress)
-        save_kept(journal, listing, spec, unfinished)
+        save_descriptors(keep_described(sequences, spec, journal, work, progress), unfinished)
 
 
 def train_dictionary(
@@ -86,8 +84,8 @@ def train_dictionary(
             spec, values = found.spec, found.values
         else:
             spec = spec or DescriptorSpec()
-            list_described(training, spec, journal, work, lambda done, _: tell(done, seen + unseen))
-            values = partial(kept_rows, journal)
+            kept = keep_described(training, spec, journal, work, lambda done, _: tell(done, seen + unseen))
+            values = kept.pieces
         dictionary = Dictionary.fit(
             values,
             spec=spec,

@@ -4,12 +4,12 @@ import hashlib
 import json
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,15 +31,7 @@ class Pieces:
     dtype: str = "<f4"
 
 
-class Column(Protocol):
-    """Strings that can be gone through again and again."""
-
-    def __len__(self) -> int: ...
-
-    def __iter__(self) -> Iterator[str]: ...
-
-
-def text_column(texts: Column) -> Pieces:
+def text_column(texts: Sequence[str]) -> Pieces:
     """Strings as an array of them, as numpy makes it of a list."""
     dtype = f"<U{max(1, max(map(len, texts), default=0))}"
 

@@ -40,6 +40,10 @@ class Answer:
     reasons: tuple[str, ...]
     arrays: dict[str, NDArray[Any]]
 
+    def frames_of(self, batch: Batch) -> list[Frame]:
+        """The frames of the batch that have a row."""
+        return [batch.frames[k] for k in self.kept.tolist()]
+
     def pack(self) -> bytes:
         """As bytes; `unpack` is the way back."""
         file = io.BytesIO()

@@ -4,6 +4,7 @@ Grammar of `PLACE.txt`, plain SRILM text: `file = { word { " " word } NL }`.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ def time_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def continues(stream: WordStream) -> NDArray[np.bool_]:
     """bool (n,): whether a frame and the one before it are both labelled, with no gap in time between them."""
-    labelled = np.array([place != "" for place in stream.places], bool)
+    labelled = stream.table.labelled
     continued = labelled & ~time_gaps(stream.times)
     continued[1:] &= labelled[:-1]
     continued[:1] = False
@@ -48,8 +49,8 @@ def visits(stream: WordStream, selection: Selection) -> list[tuple[str, list[str
     kept = select(stream.words, selection)
     continued = continues(stream)
     found: list[tuple[str, list[str]]] = []
-    for i, place in enumerate(stream.places):
-        if place and not (continued[i] and place == stream.places[i - 1]):
+    for i, (before, place) in enumerate(pairwise(["", *stream.places])):
+        if place and not (continued[i] and place == before):
             found.append((place, []))
         if place and kept[i]:
             found[-1][1].append(stream.words[i])
@@ -61,8 +62,7 @@ def place_steps(stream: WordStream, places: Sequence[str]) -> NDArray[np.int64]:
 
     Counted between the frames that `continues` connects; `places` must hold every label of the stream.
     """
-    index = {place: i for i, place in enumerate(places)}
-    at = np.array([index[place] if place else -1 for place in stream.places], np.int64)
+    at = stream.table.places.codes(places)
     after = np.flatnonzero(continues(stream))
     steps = np.bincount(at[after - 1] * len(places) + at[after], minlength=len(places) ** 2)
     return steps.reshape(len(places), len(places))

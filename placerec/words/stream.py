@@ -11,7 +11,9 @@ A text of words without a header (separated by blanks or line ends) is read as a
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ from numpy.typing import NDArray
 from placerec.errors import StreamError, at
 from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
+from placerec.frames.table import FrameTable
 
 COLUMNS = ("frame", "time", "place", "word", "distance")
 HEADER = "\t".join(COLUMNS) + "\n"
@@ -29,28 +32,68 @@ RESERVED = ("<s>", "</s>", "<unk>", "-pau-")
 
 @dataclass(frozen=True)
 class WordStream:
-    """The words of one sequence, one per frame, in time order.
+    """The words of one sequence: one per frame, in the order of the rows of `table`, which is that of time.
 
-    `times` float64 (n,) seconds, nan where unknown; `places` "" where unlabelled; `distances` float64 (n,) from the
-    descriptor to its unit, nan where unknown.
+    `distances` float64 (n,): from the descriptor to its unit, nan where unknown.
     """
 
     name: str
-    frames: tuple[str, ...] = field(repr=False)
-    times: NDArray[np.float64] = field(repr=False)
-    places: tuple[str, ...] = field(repr=False)
+    table: FrameTable
     words: tuple[str, ...] = field(repr=False)
     distances: NDArray[np.float64] = field(repr=False)
+
+    @staticmethod
+    def of(
+        name: str,
+        words: Sequence[str],
+        places: Sequence[str] | None = None,
+        *,
+        frames: Iterable[str] | None = None,
+        times: Sequence[float] | NDArray[np.float64] | None = None,
+        distances: Sequence[float] | NDArray[np.float64] | None = None,
+    ) -> "WordStream":
+        """A stream from columns, as another tokeniser makes it.
+
+        `places` are the labels, "" where there is none; `times` are in seconds; `frames` are names, their numbers if
+        left out. ValueError if the columns are not of one length.
+        """
+        table = FrameTable.of(name, map(str, range(len(words))) if frames is None else frames, times, places)
+        far = np.full(len(words), np.nan) if distances is None else np.array(distances, np.float64)
+        if not len(words) == len(table) == len(far):
+            raise ValueError(f"{name}: {len(words)} words of {len(table)} frames, {len(far)} distances")
+        return WordStream(name, table, tuple(words), far)
+
+    @staticmethod
+    def concat(parts: Sequence["WordStream"]) -> "WordStream":
+        """Parts of one sequence, one behind the other; `parts` holds at least one."""
+        return WordStream(
+            parts[0].name,
+            FrameTable.concat(part.table for part in parts),
+            tuple(chain.from_iterable(part.words for part in parts)),
+            np.concatenate([part.distances for part in parts]),
+        )
 
     def __len__(self) -> int:
         return len(self.words)
 
-    @staticmethod
-    def of(name: str, words: Sequence[str], places: Sequence[str] | None = None) -> "WordStream":
-        """A stream of bare words (and labels), as another tokeniser makes it."""
-        unknown = np.full(len(words), np.nan)
-        frames = tuple(str(i) for i in range(len(words)))
-        return WordStream(name, frames, unknown, tuple(places or [""] * len(words)), tuple(words), unknown)
+    @cached_property
+    def frames(self) -> tuple[str, ...]:
+        """The names of the frames."""
+        return tuple(self.table.names)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Seconds, float64 (n,), nan where unknown."""
+        return self.table.times
+
+    @cached_property
+    def places(self) -> tuple[str, ...]:
+        """The labels, "" where there is none."""
+        return tuple(self.table.places)
+
+    def renamed(self, name: str) -> "WordStream":
+        """The stream as that of a sequence that is called `name`."""
+        return replace(self, name=name, table=self.table.renamed(name))
 
 
 def format_seconds(time: float) -> str:
@@ -102,14 +145,10 @@ def read_stream(path: Path | str) -> WordStream:
         if place and (reason := check_place(place)):
             raise StreamError(at(path, i, f"place {place!r} {reason}; rename it"))
     blank = [""] * len(rows)
-    return WordStream(
-        name,
-        tuple(column.get("frame", [str(i) for i in range(len(rows))])),
-        _numbers(path, line_numbers, "time", column.get("time", blank)),
-        tuple(column.get("place", blank)),
-        tuple(check_word(path, i, word) for i, word in zip(line_numbers, column["word"], strict=True)),
-        _numbers(path, line_numbers, "distance", column.get("distance", blank)),
-    )
+    times = _numbers(path, line_numbers, "time", column.get("time", blank))
+    words = [check_word(path, i, word) for i, word in zip(line_numbers, column["word"], strict=True)]
+    distances = _numbers(path, line_numbers, "distance", column.get("distance", blank))
+    return WordStream.of(name, words, column.get("place"), frames=column.get("frame"), times=times, distances=distances)
 
 
 def stream_name(path: Path) -> str:

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from placerec.files import encoded, whole_folder, write_text
 from placerec.frames import Reading, find_sequences
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.batches import Batch
+from placerec.frames.table import FrameTable
 from placerec.jobs import Map, Progress
 from placerec.journal import Journal, open_journal
 from placerec.version import __version__
@@ -65,7 +64,7 @@ def streams_of(
     pieces: dict[str, list[WordStream]] = {}
     for part in _parts(sources, dictionary, matrix, reading, work, None, progress):
         pieces.setdefault(part.name, []).append(part)
-    return [_joined(parts) for parts in pieces.values()]
+    return [WordStream.concat(parts) for parts in pieces.values()]
 
 
 def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStream]:
@@ -73,17 +72,9 @@ def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStre
     units, distances = dictionary.words(descriptors)
     vocabulary = dictionary.vocabulary
     streams = []
-    for name, rows in descriptors.rows_by_sequence().items():
-        streams.append(
-            WordStream(
-                name,
-                tuple(descriptors.frames[row] for row in rows),
-                descriptors.times[rows],
-                tuple(descriptors.places[row] for row in rows),
-                tuple(vocabulary[unit] for unit in units[rows].tolist()),
-                distances[rows].astype(float),
-            )
-        )
+    for name, rows in descriptors.table.by_sequence().items():
+        words = tuple(vocabulary[unit] for unit in units[rows].tolist())
+        streams.append(WordStream(name, descriptors.table.take(rows), words, distances[rows].astype(float)))
     return streams
 
 
@@ -135,28 +126,12 @@ def _tokenized(
     found = answers(function, sequences, dictionary.spec, tally, key=key, work=work, journal=journal, progress=progress)
     vocabulary = dictionary.vocabulary
     for batch, answer in found:
-        frames = [batch.frames[k] for k in answer.kept.tolist()]
+        frames = answer.frames_of(batch)
         if frames:
-            yield WordStream(
-                batch.sequence,
-                tuple(frame.name for frame in frames),
-                np.array([frame.time for frame in frames], np.float64),
-                tuple(frame.place for frame in frames),
-                tuple(vocabulary[unit] for unit in answer.arrays["units"].tolist()),
-                answer.arrays["distances"].astype(float),
-            )
+            words = tuple(vocabulary[unit] for unit in answer.arrays["units"].tolist())
+            table = FrameTable.of_frames(batch.sequence, frames)
+            yield WordStream(batch.sequence, table, words, answer.arrays["distances"].astype(float))
     tally.close()
-
-
-def _joined(parts: Sequence[WordStream]) -> WordStream:
-    return WordStream(
-        parts[0].name,
-        tuple(frame for part in parts for frame in part.frames),
-        np.concatenate([part.times for part in parts]),
-        tuple(place for part in parts for place in part.places),
-        tuple(word for part in parts for word in part.words),
-        np.concatenate([part.distances for part in parts]),
-    )
 
 
 def _write(parts: Iterable[WordStream], dictionary: Dictionary, folder: Path) -> tuple[set[str], set[str]]:

@@ -13,13 +13,13 @@ from placerec.errors import EvaluationError, OutputError
 from placerec.hohmm.beliefs import (
     COLUMNS,
     Beliefs,
-    best_places,
     format_header,
     format_row,
     parse_beliefs,
     read_beliefs,
     write_beliefs,
 )
+from placerec.words import WordStream
 
 HEADER = "frame\ttime\tplace\tword\tselected\tbest\tkitchen\toffice"
 ROW = "t1.jpeg\t0.5\tkitchen\tw07\t1\toffice\t0.25\t0.75"
@@ -88,13 +88,10 @@ def written(draw: st.DrawFn) -> Beliefs:
     weights = draw(st.lists(st.floats(1e-30, 1), min_size=count * len(places), max_size=count * len(places)))
     belief = np.array(weights, dtype=np.float64).reshape(count, len(places))
     times = draw(st.lists(st.floats(0, 2e9) | st.just(np.nan), min_size=count, max_size=count))
+    stream = WordStream.of("seq1", column(words), column(words), frames=column(words), times=times)
     return Beliefs(
-        name="seq1",
-        places=places,
-        frames=column(words),
-        times=np.array(times, dtype=np.float64),
-        truth=column(words),
-        words=column(words),
+        stream,
+        places,
         selected=np.array(draw(st.lists(st.booleans(), min_size=count, max_size=count)), dtype=np.bool_),
         best=column(st.sampled_from(places)),
         belief=belief / belief.sum(axis=1, keepdims=True),
@@ -142,8 +139,13 @@ def test_the_column_unknown_is_no_place_and_stands_beside_the_sum() -> None:
 def test_unknown_is_decided_above_a_half_and_where_the_column_is() -> None:
     belief = np.array([[0.25, 0.75], [0.5, 0.5], [0.9, 0.1]])
     places = ("kitchen", "office")
-    assert best_places(places, belief.argmax(axis=1)) == ("office", "kitchen", "kitchen")
-    assert best_places(places, belief.argmax(axis=1), np.array([0.5, 0.51, 0.0])) == ("office", "unknown", "kitchen")
+    stream = WordStream.of("s", ["w0"] * 3)
+    assert Beliefs.of(stream, places, belief).best == ("office", "kitchen", "kitchen")
+    unknown = np.array([0.5, 0.51, 0.0])
+    assert Beliefs.of(stream, places, belief, unknown=unknown).best == ("office", "unknown", "kitchen")
+    path, kept = np.array([0, 0, 1]), np.array([True, False, False])
+    given = Beliefs.of(stream, places, belief, selected=kept, best=path, unknown=unknown)
+    assert (given.best, given.selected.tolist()) == (("kitchen", "unknown", "office"), [True, False, False])
     decided = ROW.replace("\toffice\t", "\tunknown\t")
     assert parse_beliefs(f"{HEADER}\tunknown\n{decided}\t0.9\n", name="s", source="x").best == ("unknown",)
     with pytest.raises(EvaluationError, match="best is 'unknown', which is no place of the header"):

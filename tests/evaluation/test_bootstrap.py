@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.small_world import beliefs_of
 
 from placerec.errors import EvaluationError
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
@@ -15,19 +16,8 @@ PLACES = ("hall", "kitchen")
 def judged(name: str, truth: str, best: str) -> Beliefs:
     """A sequence from letters: h and k, a dot where unlabelled."""
     label = {"h": "hall", "k": "kitchen", ".": ""}
-    n = len(truth)
     belief = np.array([[1.0, 0.0] if letter == "h" else [0.0, 1.0] for letter in best])
-    return Beliefs(
-        name,
-        PLACES,
-        tuple(map(str, range(n))),
-        np.arange(n, dtype=np.float64),
-        tuple(label[letter] for letter in truth),
-        ("w",) * n,
-        np.ones(n, np.bool_),
-        tuple(label[letter] for letter in best),
-        belief,
-    )
+    return beliefs_of(name, PLACES, [label[letter] for letter in truth], [label[letter] for letter in best], belief)
 
 
 THREE = [judged("a", "hhkk", "hhkh"), judged("b", "..hh", "hhkh"), judged("c", "kkkk", "kkkk"), judged("d", "..", "hk")]

@@ -3,12 +3,14 @@
 import json
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from statistics import median
 
 import numpy as np
 import pytest
+from helpers.small_world import beliefs_of
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -22,21 +24,11 @@ from placerec.hohmm.beliefs import Beliefs
 
 def sequence(truth: str, best: str, belief: object = None, *, name: str = "seq1", places: str = "ABC") -> Beliefs:
     """One letter per frame, a dot where there is no label; by default 0.8 for the best place, the rest evenly."""
-    count = len(truth)
     if belief is None:
         rest = 0.2 / max(1, len(places) - 1)
         belief = [[0.8 if place == choice else rest for place in places] for choice in best]
-    return Beliefs(
-        name=name,
-        places=tuple(places),
-        frames=tuple(f"{index}.jpeg" for index in range(count)),
-        times=np.arange(count) / 5,
-        truth=tuple(label.replace(".", "") for label in truth),
-        words=("w0",) * count,
-        selected=np.ones(count, dtype=np.bool_),
-        best=tuple(best),
-        belief=np.array(belief, dtype=np.float64).reshape(count, len(places)),
-    )
+    labels = [label.replace(".", "") for label in truth]
+    return beliefs_of(name, places, labels, best, np.array(belief, dtype=np.float64).reshape(len(truth), len(places)))
 
 
 def test_shares_of_a_case_worked_by_hand() -> None:
@@ -205,8 +197,7 @@ def test_without_the_column_nobody_is_judged_by_it() -> None:
 
 
 def test_a_label_called_unknown_is_a_new_place() -> None:
-    made = sequence("AA", "AA", places="AB")
-    result = evaluate([with_unknown(replace(made, truth=("A", "unknown")), [0.2, 0.8])])
+    result = evaluate([with_unknown(beliefs_of("seq1", "AB", ["A", "unknown"], "AA"), [0.2, 0.8])])
     assert result.places == ("A", "B", "unknown")
     assert (result.accuracy, result.to_json()["unknown_auroc"]) == (1.0, 1.0)
 
@@ -318,7 +309,7 @@ def plain_ece(frames: list[tuple[float, bool]]) -> float:
     return error
 
 
-def plain_latencies(truth: tuple[str, ...], best: tuple[str, ...]) -> list[int]:
+def plain_latencies(truth: Sequence[str], best: tuple[str, ...]) -> list[int]:
     visits: list[tuple[str, list[str]]] = []
     before = ""
     for label, choice in zip(truth, best, strict=True):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.small_world import beliefs_of
 
 from placerec.errors import MissingExtraError, OutputError
 from placerec.evaluation import belief_strip, confusion_panel, evaluate, figure_file, plot_evaluation
@@ -26,17 +27,8 @@ def recording(name: str, frames: int = 60, wrong: int = 5, places: tuple[str, ..
     belief[np.arange(frames), best] = 0.9
     labels = [places[place] for place in truth]
     labels[frames // 2 : frames // 2 + 4] = [""] * min(4, frames)
-    return Beliefs(
-        name=name,
-        places=places,
-        frames=tuple(map(str, range(frames))),
-        times=np.arange(frames) / 5,
-        truth=tuple(labels[:frames]),
-        words=("w",) * frames,
-        selected=np.ones(frames, dtype=np.bool_),
-        best=tuple(places[place] for place in best),
-        belief=belief,
-    )
+    decided = [places[place] for place in best]
+    return beliefs_of(name, places, labels[:frames], decided, belief, np.arange(frames) / 5)
 
 
 def drawn_text(path: Path) -> str:
@@ -136,7 +128,7 @@ def test_of_many_sequences_the_best_and_the_worst_are_drawn(tmp_path: Path) -> N
 
 def test_sequences_without_a_label_give_way_to_others() -> None:
     beliefs = [recording(f"seq{number}") for number in range(22)]
-    beliefs[3] = replace(beliefs[3], truth=("",) * 60)
+    beliefs[3] = beliefs_of("seq3", PLACES, [""] * 60, beliefs[3].best)
     result = evaluate(beliefs)
     assert beliefs[3] not in chosen(beliefs, result)
     assert beliefs[3] in chosen(beliefs[:4], result)

@@ -17,6 +17,7 @@ from placerec.evaluation.word_stability import format_stability, plot_stability
 from placerec.evaluation.word_table import WordTable
 from placerec.frames import read_gray
 from placerec.frames.sequence import Gray
+from placerec.frames.table import FrameTable
 from placerec.vision import DescriptorSpec, train_dictionary
 from placerec.vision.stability import ChangeResult, Stability
 
@@ -61,8 +62,7 @@ def table(size: int, places: tuple[str, ...], seed: int = 0) -> WordTable:
         u_matrix=rng.random(count),
         to_dead=3,
         is_training=False,
-        sequence_names=("run",) * int(frames.sum()),
-        frame_names=("f.png",) * int(frames.sum()),
+        looked_at=FrameTable.of("run", ["f.png"] * int(frames.sum())),
     )
 
 

@@ -5,33 +5,18 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers.small_world import beliefs_of
 
 from placerec.evaluation import evaluate, format_evaluation
 from placerec.evaluation.summary import shorten
-from placerec.hohmm.beliefs import Beliefs
-
-
-def make(name: str, places: list[str], truth: list[str], best: list[str]) -> Beliefs:
-    count = len(truth)
-    return Beliefs(
-        name=name,
-        places=tuple(places),
-        frames=tuple(map(str, range(count))),
-        times=np.full(count, np.nan),
-        truth=tuple(truth),
-        words=("w",) * count,
-        selected=np.ones(count, dtype=np.bool_),
-        best=tuple(best),
-        belief=np.full((count, len(places)), 1 / len(places)),
-    )
 
 
 def test_the_whole_table_of_a_small_case() -> None:
     text = format_evaluation(
         evaluate(
             [
-                make("day", ["hall", "lab"], ["hall", "hall", "lab", ""], ["hall", "lab", "hall", "hall"]),
-                make("night", ["hall", "lab"], ["hall"], ["hall"]),
+                beliefs_of("day", ["hall", "lab"], ["hall", "hall", "lab", ""], ["hall", "lab", "hall", "hall"]),
+                beliefs_of("night", ["hall", "lab"], ["hall"], ["hall"]),
             ]
         )
     )
@@ -61,7 +46,9 @@ def test_long_names_and_many_places_fit_100_columns(count: int) -> None:
     places = [f"the very long name of the place with the number {number} in the left wing" for number in range(count)]
     truth = [place for place in places for _ in range(1000 // count)]
     text = format_evaluation(
-        evaluate([make("s" * 200, places, truth, truth[1:] + truth[:1]), make("t" * 200, places, truth, truth)])
+        evaluate(
+            [beliefs_of("s" * 200, places, truth, truth[1:] + truth[:1]), beliefs_of("t" * 200, places, truth, truth)]
+        )
     )
     lines = text.split("\n")
     assert max(map(len, lines)) <= 100
@@ -72,25 +59,26 @@ def test_long_names_and_many_places_fit_100_columns(count: int) -> None:
 def test_too_many_places_for_a_matrix_list_the_largest_confusions() -> None:
     places = [f"p{number}" for number in range(40)]
     best = [*places[:30], *["p0"] * 10]
-    lines = format_evaluation(evaluate([make("s", places, places + ["p7"] * 3, best + ["p8"] * 3)])).split("\n")
+    lines = format_evaluation(evaluate([beliefs_of("s", places, places + ["p7"] * 3, best + ["p8"] * 3)])).split("\n")
     start = lines.index("most frequent confusions (too many places for a matrix of this width)")
     assert lines[start + 1] == "       3  p7 taken for p8"
     assert len(lines[start:]) == 11
 
 
 def test_what_is_undefined_is_a_dash() -> None:
-    text = format_evaluation(evaluate([make("s", ["a", "b"], ["a"], ["a"])]))
+    text = format_evaluation(evaluate([beliefs_of("s", ["a", "b"], ["a"], ["a"])]))
     assert "change latency     – (0 changes of place)" in text
     assert "  2  b             0          –          –" in text
 
 
 def test_new_places_have_a_line_where_they_were_asked_for() -> None:
-    made = make("s", ["a"], ["a", "a", "z"], ["a", "a", "unknown"])
+    made = beliefs_of("s", ["a"], ["a", "a", "z"], ["a", "a", "unknown"])
     text = format_evaluation(evaluate([replace(made, unknown=np.array([0.1, 0.3, 0.8]))]))
     assert "unknown AUROC      1.000   (1 frames of places without a column, 2 of others)" in text
-    text = format_evaluation(evaluate([replace(made, truth=("a",) * 3, unknown=np.array([0.1, 0.3, 0.8]))]))
+    made = beliefs_of("s", ["a"], ["a"] * 3, ["a", "a", "unknown"])
+    text = format_evaluation(evaluate([replace(made, unknown=np.array([0.1, 0.3, 0.8]))]))
     assert "unknown AUROC      –   (0 frames of places without a column, 3 of others)" in text
-    assert "unknown AUROC" not in format_evaluation(evaluate([make("s", ["a"], ["a"], ["a"])]))
+    assert "unknown AUROC" not in format_evaluation(evaluate([beliefs_of("s", ["a"], ["a"], ["a"])]))
 
 
 def test_a_shortened_name_keeps_both_ends() -> None:

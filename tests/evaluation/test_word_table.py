@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from placerec.errors import SourceError
 from placerec.evaluation.word_table import WordTable, format_words, typical_images, u_matrix, word_table
 from placerec.frames import Reading, find_sequences
+from placerec.frames.table import FrameTable
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary
 
 SPEC = DescriptorSpec(image_size=16)
@@ -26,11 +27,14 @@ def sample(n: int, seed: int) -> NDArray[np.float32]:
     return (centres[rng.integers(6, size=n)] + 0.02 * rng.random((n, 384))).astype(np.float32)
 
 
-def described(n: int = 60, seed: int = 1, places: tuple[str, ...] = ("b", "a", "")) -> Descriptors:
-    sequences = tuple("one" if i < n // 2 else "two" for i in range(n))
-    labels = tuple(places[i * 7 // n % len(places)] for i in range(n))
-    names = tuple(f"f{i}.png" for i in range(n))
-    return Descriptors(SPEC, sample(n, seed), names, sequences, np.full(n, np.nan), labels, 0, 0)
+def described(n: int = 60, seed: int = 1, places: tuple[str, ...] = ("b", "a", ""), apart: int = 99) -> Descriptors:
+    """Frames of two sequences, `apart` of other names before a name comes again."""
+    labels = [places[i * 7 // n % len(places)] for i in range(n)]
+    names = [f"f{i % apart}.png" for i in range(n)]
+    half = n // 2
+    one = FrameTable.of("one", names[:half], places=labels[:half])
+    two = FrameTable.of("two", names[half:], places=labels[half:])
+    return Descriptors(SPEC, sample(n, seed), FrameTable.concat([one, two]))
 
 
 def dictionary(units: str = "live") -> Dictionary:
@@ -85,7 +89,7 @@ def test_json_is_a_row_per_unit_without_nan() -> None:
 
 
 def test_the_typical_frames_of_sequences_of_equal_image_names_are_told_apart(tmp_path: Path) -> None:
-    frames = replace(described(), frames=tuple(f"f{i % 30}.png" for i in range(60)))
+    frames = described(apart=30)
     for level in range(60):
         path = tmp_path / ("one" if level < 30 else "two") / f"f{level % 30}.png"
         path.parent.mkdir(exist_ok=True)
@@ -118,8 +122,7 @@ def by_hand(**changes: Any) -> WordTable:
         u_matrix=np.array([0.1, 0.2, 0.3, 0.4]),
         to_dead=1,
         is_training=False,
-        sequence_names=("run",) * 7,
-        frame_names=tuple(f"{i}.png" for i in range(7)),
+        looked_at=FrameTable.of("run", [f"{i}.png" for i in range(7)]),
     )
     return replace(table, **changes)
 

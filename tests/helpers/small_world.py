@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from placerec.hohmm import Beliefs
 from placerec.words import WordStream, write_stream, write_vocabulary
 
 PLACES = ("hall", "kitchen", "office")
@@ -22,10 +25,28 @@ def run_through(name: str, seed: int, frames: int = 60) -> WordStream:
         stray = rng.integers(len(VOCABULARY))
         again = words and rng.random() < 0.4
         words.append(words[-1] if again else VOCABULARY[stray if rng.random() < 0.1 else own])
-    bare = WordStream.of(name, words, places)
-    return WordStream(
-        name, bare.frames, np.arange(frames, dtype=np.float64) / 2, bare.places, bare.words, bare.distances
-    )
+    return WordStream.of(name, words, places, times=np.arange(frames) / 2)
+
+
+def with_columns(stream: WordStream, **columns: Any) -> WordStream:
+    """The stream with other places, times, frames or distances."""
+    kept = {"places": stream.places, "times": stream.times, "frames": stream.frames, "distances": stream.distances}
+    return WordStream.of(stream.name, stream.words, **(kept | columns))
+
+
+def beliefs_of(
+    name: str,
+    places: Sequence[str],
+    truth: Sequence[str],
+    best: Sequence[str],
+    belief: NDArray[np.float64] | None = None,
+    times: NDArray[np.float64] | None = None,
+) -> Beliefs:
+    """What was decided about frames of one word, all of them selected; beliefs are uniform if left out."""
+    stream = WordStream.of(name, ["w0"] * len(truth), truth, times=times)
+    if belief is None:
+        belief = np.full((len(truth), len(places)), 1 / len(places))
+    return Beliefs(stream, tuple(places), np.ones(len(truth), bool), tuple(best), belief)
 
 
 def write_tokens(folder: Path, names: Sequence[str] = ("run1", "run2", "run3")) -> Path:

@@ -139,8 +139,7 @@ def test_one_place_has_no_rival() -> None:
 def test_what_speaks_for_a_new_place_is_told_too() -> None:
     models = models_of(CORPUS, 2)
     recognizer = Recognizer(models, unknown=novelty(3))
-    bare = WordStream.of("run", ["a", "b", "c"])
-    stream = WordStream("run", bare.frames, bare.times, bare.places, bare.words, np.array([0.5, 9.0, np.nan]))
+    stream = WordStream.of("run", ["a", "b", "c"], distances=[0.5, 9.0, np.nan])
     unknown = recognizer.decode(stream).unknown
     found = [one["unknown"] for one in explained(recognizer, models, stream)]
     assert [one["after"] for one in found] == pytest.approx(unknown, rel=1e-5)

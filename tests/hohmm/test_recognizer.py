@@ -117,8 +117,7 @@ def test_transitions_between_other_places_are_refused() -> None:
 
 
 def timed(words: list[str], times: list[float]) -> WordStream:
-    bare = WordStream.of("run", words)
-    return WordStream("run", bare.frames, np.array(times, float), bare.places, bare.words, bare.distances)
+    return WordStream.of("run", words, times=times)
 
 
 @st.composite

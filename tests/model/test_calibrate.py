@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.small_world import run_through, write_tokens
+from helpers.small_world import run_through, with_columns, write_tokens
 
 from placerec.errors import ModelError, StreamError
 from placerec.evaluation import evaluate
@@ -119,7 +119,7 @@ def test_sequences_that_trained_the_words_are_refused(world: Path) -> None:
 def test_frames_without_a_known_label_are_left_out_and_counted(world: Path, caplog: pytest.LogCaptureFixture) -> None:
     stream = run_through("run3", 2)
     places = ("", "", "attic", *stream.places[3:])
-    write_stream(replace(stream, places=places), world / "run3.tsv")
+    write_stream(with_columns(stream, places=places), world / "run3.tsv")
     with caplog.at_level(logging.INFO, "placerec"):
         found = calibrate(world / "model", [world / "run3.tsv"])
     assert found.frames == 57
@@ -128,7 +128,7 @@ def test_frames_without_a_known_label_are_left_out_and_counted(world: Path, capl
 
 def test_no_labelled_frame_is_an_error(world: Path) -> None:
     stream = run_through("run3", 2)
-    write_stream(replace(stream, places=("",) * 60), world / "run3.tsv")
+    write_stream(with_columns(stream, places=None), world / "run3.tsv")
     with pytest.raises(ModelError, match=r"^run3: no frame is labelled with a place of .*; calibration needs labelled"):
         calibrate(world / "model", [world / "run3.tsv"])
     with pytest.raises(StreamError, match="no such file"):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.small_world import write_images
+from helpers.small_world import with_columns, write_images
 
 from placerec.baselines import load_decoder
 from placerec.errors import ModelError, SourceError, StreamError
@@ -110,7 +110,7 @@ def followed(
 )
 def test_the_same_as_from_files(method: str, options: Decoding, world: Path) -> None:
     stream = read_stream(world / "tokens/seq2.tsv")
-    stream = replace(stream, times=np.arange(len(stream), dtype=np.float64) * 0.004)
+    stream = with_columns(stream, times=np.arange(len(stream)) * 0.004)
     expected = load_decoder(method, world / "model", options=options).decode(stream)
     answers, report = followed(shots_of(world / "runs/seq2", 0.004), world, options, method)
     assert [frame.name for frame, _ in answers] == list(expected.frames)

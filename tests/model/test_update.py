@@ -44,8 +44,7 @@ def contents(folder: Path) -> dict[str, str]:
 
 def write_run(path: Path, frames: Sequence[tuple[str, str, float, float]]) -> Path:
     places, words, steps, distances = zip(*frames, strict=True)
-    bare = WordStream.of(path.stem, words, places)
-    write_stream(WordStream(path.stem, bare.frames, np.cumsum(steps), places, words, np.array(distances)), path)
+    write_stream(WordStream.of(path.stem, words, places, times=np.cumsum(steps), distances=distances), path)
     return path
 
 

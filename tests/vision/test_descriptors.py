@@ -50,7 +50,7 @@ def test_every_frame_in_order(tmp_path: Path) -> None:
     image = cv2.imread(str(tmp_path / "a/001.png"), cv2.IMREAD_GRAYSCALE)
     want = gist(fit_image(np.asarray(image, np.uint8), 32, "crop"), variant="classic")
     np.testing.assert_array_equal(described.values[4], want)
-    rows = described.rows_by_sequence()
+    rows = described.table.by_sequence()
     assert {name: list(mine) for name, mine in rows.items()} == {"b": [0, 1, 2], "a": [3, 4]}
     assert list(rows) == ["b", "a"]
 
@@ -143,7 +143,7 @@ def test_sources_to_files(tmp_path: Path) -> None:
 def test_the_second_lap_of_a_real_corridor_is_told_by_the_words_of_the_first(shared: Path) -> None:
     described = describe(find_sequences([shared / "data/rtabmap_corridor"]), DescriptorSpec(image_size=64))
     assert (len(described.values), described.skipped, described.constant) == (84, 0, 0)
-    rows, places = described.rows_by_sequence(), np.array(described.places)
+    rows, places = described.table.by_sequence(), np.array(described.places)
     first, second = described.values[rows["lap1"]], described.values[rows["lap2"]]
     seen, asked = places[rows["lap1"]], places[rows["lap2"]]
     dictionary = Dictionary.fit(first, spec=described.spec, size=5)

@@ -16,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from placerec.errors import OutputError, VisionError
+from placerec.frames.table import FrameTable
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, descriptor
 from placerec.vision.chunks import CHUNK, Source
 from placerec.vision.dictionary import Quality
@@ -167,8 +168,7 @@ def test_the_bytes_do_not_depend_on_the_blas_and_its_threads() -> None:
 
 def test_descriptors_of_another_kind_are_refused(dictionary: Dictionary) -> None:
     rows = sample(3)
-    names = ("a", "b", "c")
-    mine = Descriptors(SPEC, rows, names, names, np.zeros(3), names, 0, 0)
+    mine = Descriptors(SPEC, rows, FrameTable.of("run", ["a", "b", "c"]))
     np.testing.assert_array_equal(dictionary.words(mine)[0], dictionary.words(rows)[0])
     assert dictionary.measure(mine) == dictionary.measure(rows)
     other = replace(mine, spec=DescriptorSpec("classic"))

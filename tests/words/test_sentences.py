@@ -23,10 +23,7 @@ from placerec.words import (
 
 def stream(words: str, places: str, times: list[float] | None = None) -> WordStream:
     """A stream of one-letter words and places; `-` is unlabelled."""
-    made = WordStream.of("run", words.split(), ["" if p == "-" else p for p in places.split()])
-    if times is None:
-        return made
-    return WordStream("run", made.frames, np.array(times), made.places, made.words, made.distances)
+    return WordStream.of("run", words.split(), ["" if p == "-" else p for p in places.split()], times=times)
 
 
 def test_a_visit_ends_where_the_place_changes_or_the_label_stops() -> None:
@@ -69,12 +66,12 @@ def test_triples_are_visits_one_after_the_other() -> None:
 @given(st.lists(st.tuples(st.sampled_from(["", "K", "L"]), st.sampled_from([0.0, 1.0, 1.0, 1.5, 99.0])), max_size=30))
 def test_a_change_of_place_without_a_break_is_a_step_between_two_visits(frames: list[tuple[str, float]]) -> None:
     """Frames that stay are steps as well: one less in each visit than it has frames."""
-    bare = WordStream.of("run", ["a"] * len(frames), [place for place, _ in frames])
+    places = [place for place, _ in frames]
     times = np.cumsum([step for _, step in frames])
-    seen = WordStream("run", bare.frames, times, bare.places, bare.words, bare.distances)
+    seen = WordStream.of("run", ["a"] * len(frames), places, times=times)
     steps = place_steps(seen, ["K", "L"])
     assert steps.trace() == sum(len(words) - 1 for _, words in visits(seen, Selection()))
-    changes = [pair for i, pair in enumerate(pairwise(bare.places)) if "" not in pair and not time_gaps(times)[i + 1]]
+    changes = [pair for i, pair in enumerate(pairwise(places)) if "" not in pair and not time_gaps(times)[i + 1]]
     assert steps[0, 1] == changes.count(("K", "L"))
     assert steps[1, 0] == changes.count(("L", "K"))
 

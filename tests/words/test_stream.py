@@ -29,7 +29,7 @@ def test_what_is_written_is_read_back(
     tmp_path_factory: pytest.TempPathFactory, lines: list[tuple[str, float, str, str, float]]
 ) -> None:
     frames, times, places, words, distances = zip(*lines, strict=True) if lines else ((), (), (), (), ())
-    stream = WordStream("run", frames, np.array(times, float), places, words, np.array(distances, float))
+    stream = WordStream.of("run", words, places, frames=frames, times=times, distances=distances)
     path = tmp_path_factory.getbasetemp() / "run.tsv"
     write_stream(stream, path)
     back = read_stream(path)
@@ -39,14 +39,9 @@ def test_what_is_written_is_read_back(
 
 
 def test_file_is_as_the_contract_says(tmp_path: Path) -> None:
-    stream = WordStream(
-        "run",
-        ("t1.5.jpeg", "t2.jpeg"),
-        np.array([1.5, np.nan]),
-        ("kitchen", ""),
-        ("w07", "w11"),
-        np.array([0.25, np.nan]),
-    )
+    frames = ("t1.5.jpeg", "t2.jpeg")
+    far = [0.25, np.nan]
+    stream = WordStream.of("run", ["w07", "w11"], ["kitchen", ""], frames=frames, times=[1.5, np.nan], distances=far)
     write_stream(stream, tmp_path / "run.tsv")
     assert (tmp_path / "run.tsv").read_bytes() == (
         b"frame\ttime\tplace\tword\tdistance\nt1.5.jpeg\t1.5\tkitchen\tw07\t0.25\nt2.jpeg\t\t\tw11\t\n"
