@@ -30,10 +30,11 @@ _ROOMS = {
     ),
     "placerec.model": ("Decoding", "Options", "calibrate", "follow_live", "load_recognizer", "train_lm", "update"),
     "placerec.baselines": ("decode", "load_decoder"),
-    "placerec.evaluation": ("evaluate", "evaluate_files", "inspect_decision"),
-    "placerec.evaluation.compare": ("compare",),
-    "placerec.evaluation.look": ("show_frame", "show_words", "stability"),
-    "placerec.experiments": ("experiment",),
+    "placerec.evaluation": ("evaluate",),
+    "placerec.experiments.comparison": ("compare",),
+    "placerec.experiments.grid": ("experiment",),
+    "placerec.figures": ("evaluate_files",),
+    "placerec.inspection": ("inspect_decision", "show_frame", "show_words", "stability"),
     "placerec.lab": ("render_lab",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
@@ -41,10 +42,10 @@ _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 if TYPE_CHECKING:
     from placerec.baselines import decode, load_decoder
     from placerec.errors import PlacerecError
-    from placerec.evaluation import evaluate, evaluate_files, inspect_decision
-    from placerec.evaluation.compare import compare
-    from placerec.evaluation.look import show_frame, show_words, stability
-    from placerec.experiments import experiment
+    from placerec.evaluation import evaluate
+    from placerec.experiments.comparison import compare
+    from placerec.experiments.grid import experiment
+    from placerec.figures import evaluate_files
     from placerec.frames import Frame, Reading, Sequence, find_sequences, read_gray
     from placerec.hohmm import (
         Belief,
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
         read_beliefs,
         read_transitions,
     )
+    from placerec.inspection import inspect_decision, show_frame, show_words, stability
     from placerec.lab import render_lab
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.checks import check_model

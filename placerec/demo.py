@@ -10,24 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from placerec.errors import check_optional
-from placerec.evaluation import (
-    Evaluation,
-    evaluate,
-    heading,
-    html_page,
-    paragraph,
-    picture,
-    plot_evaluation,
-    preformatted,
-    table,
-)
-from placerec.evaluation.sheet import contact_sheet
-from placerec.evaluation.word_sheet import draw_word_sheet
-from placerec.evaluation.word_table import WordTable, typical_images, word_sentences, word_table
+from placerec.evaluation import Evaluation, evaluate
+from placerec.figures import heading, html_page, paragraph, picture, plot_evaluation, preformatted, table
+from placerec.figures.sheet import contact_sheet
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import find_sequences
 from placerec.hohmm import Beliefs, write_beliefs
+from placerec.inspection.word_sheet import draw_word_sheet
+from placerec.inspection.words import WordTable, typical_images, word_sentences, word_table
 from placerec.lab import render_lab
 from placerec.lm.inspection import format_inspection, inspect_model
 from placerec.model import Options, load_recognizer, read_corpus, train_model

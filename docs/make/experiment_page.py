@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import LEAST
-from placerec.experiments import Results, Row, experiment
-from placerec.experiments.claims import Claim, judge
-from placerec.experiments.results import SequenceCount, by_seed
-from placerec.experiments.tables import Table, markdown, numbers_of
+from placerec.experiments.grid import Results, Row, experiment
+from placerec.experiments.grid.claims import Claim, judge
+from placerec.experiments.grid.results import SequenceCount, by_seed
+from placerec.experiments.grid.tables import Table, markdown, numbers_of
 from placerec.files import write_text
 from placerec.lab import render_lab
 

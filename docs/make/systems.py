@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
-from placerec.evaluation.compare import SIZE, compare
-from placerec.evaluation.compare_plot import plot_comparison
-from placerec.evaluation.comparison import Comparison, MethodScore, format_methods, format_pairs, judge
-from placerec.evaluation.contest import ALL, Run
-from placerec.evaluation.material import Front
+from placerec.experiments.comparison.benchmark import ALL, Run
+from placerec.experiments.comparison.figure import plot_comparison
+from placerec.experiments.comparison.material import Front
+from placerec.experiments.comparison.results import Comparison, MethodScore, format_methods, format_pairs, judge
+from placerec.experiments.comparison.run import SIZE, compare
 from placerec.files import write_text
 from placerec.frames import find_sequences
 from placerec.hohmm import read_beliefs

@@ -54,9 +54,9 @@ def compare(
     TRAIN and SEQUENCE are labelled sequences (of images, videos, bags), or folders of them. Each method learns from
     TRAIN; accuracy with its interval, cost per frame, and for every two methods whether their difference holds.
     """
-    from placerec.evaluation.compare import check_methods
-    from placerec.evaluation.compare import compare as run
-    from placerec.evaluation.comparison import format_comparison
+    from placerec.experiments.comparison.results import format_comparison
+    from placerec.experiments.comparison.run import check_methods
+    from placerec.experiments.comparison.run import compare as run
 
     with usage("--methods"):
         chosen = check_methods(None if methods is None else methods.split(","))

@@ -30,7 +30,7 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
     transition = ["fixed", "learned"]
     seeds = 5
     """
-    from placerec.experiments import experiment as run
+    from placerec.experiments.grid import experiment as run
     from placerec.jobs import processors
 
     results = run(config, out, jobs=jobs or processors(), progress=progress_bar)

@@ -41,7 +41,7 @@ def inspect(path: Path, asked: tuple[str, ...], top: int, as_json: bool, out: Pa
 
 
 def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[object, str]:
-    from placerec.evaluation.decision import format_decision, inspect_decision
+    from placerec.inspection.decision import format_decision, inspect_decision
 
     if click.get_current_context().get_parameter_source("top") is not ParameterSource.DEFAULT:
         raise click.UsageError("--top is for models; leave it out")

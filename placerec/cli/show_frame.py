@@ -38,8 +38,8 @@ def show_frame(
     and scale, and the units of the map that are nearest to it. With SOURCE, which is what tokenize takes, it is told
     what these units look like, and which place they mostly belong to, among the frames there.
     """
-    from placerec.evaluation.frame_view import format_frame
-    from placerec.evaluation.look import show_frame as run
+    from placerec.inspection.frame import format_frame
+    from placerec.inspection.show import show_frame as run
 
     with progress_bar("describe") as progress:
         view = run(image, words, sources, out, reading=reading, progress=progress)

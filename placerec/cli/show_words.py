@@ -41,8 +41,8 @@ def show_words(
     the sheet shows the frame nearest to it, the place that most frames with this word have, and the training frames
     that hit it; and how far neighbouring units are from each other (U-matrix).
     """
-    from placerec.evaluation.look import show_words as run
-    from placerec.evaluation.word_table import format_words
+    from placerec.inspection.show import show_words as run
+    from placerec.inspection.words import format_words
 
     with progress_bar("describe") as progress:
         matrix = descriptor and descriptor[1]

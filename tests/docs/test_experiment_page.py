@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from helpers.small_world import write_tokens
 
-from placerec.experiments import read_config
-from placerec.experiments.results import COLUMNS, SEQUENCE_COLUMNS
-from placerec.experiments.tables import PAPER_RUNS
+from placerec.experiments.grid import read_config
+from placerec.experiments.grid.results import COLUMNS, SEQUENCE_COLUMNS
+from placerec.experiments.grid.tables import PAPER_RUNS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "experiment.md"

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 from helpers.ebnf import read_grammars
 
-from placerec.experiments.results import COLUMNS
+from placerec.experiments.grid.results import COLUMNS
 from placerec.lm import SMOOTHINGS
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

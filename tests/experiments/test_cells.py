@@ -9,10 +9,10 @@ from helpers.small_experiment import write_grid
 from hypothesis import given
 from hypothesis import strategies as st
 
-from placerec.evaluation import evaluate_files
-from placerec.experiments import read_config
-from placerec.experiments.cells import Cell, CellJob, believe_cell, describe_data, seven_digits
-from placerec.experiments.run import run_grid
+from placerec.experiments.grid import read_config
+from placerec.experiments.grid.cells import Cell, CellJob, believe_cell, describe_data, seven_digits
+from placerec.experiments.grid.run import run_grid
+from placerec.figures import evaluate_files
 from placerec.hohmm import Beliefs, read_beliefs
 from placerec.model import Decoding, Options, decode, train_lm
 from placerec.words import WordStream, parse_selection

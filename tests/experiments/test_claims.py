@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from placerec.experiments.bootstrap import MissingCellsError, drawn, scores
-from placerec.experiments.claims import FAILS, HOLDS, UNKNOWN, judge
-from placerec.experiments.results import Results, Row, SequenceCount
+from placerec.experiments.grid.bootstrap import MissingCellsError, drawn, scores
+from placerec.experiments.grid.claims import FAILS, HOLDS, UNKNOWN, judge
+from placerec.experiments.grid.results import Results, Row, SequenceCount
 
 SELECTS = ("none", "subsample:3", "subsample:5", "compress:3", "unique")
 Percent = Callable[[int, str, str, int, int], float]

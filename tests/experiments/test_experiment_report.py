@@ -11,11 +11,11 @@ from helpers.small_experiment import CONFIG, write_grid
 from helpers.small_world import write_images
 
 from placerec.cli import commands
-from placerec.evaluation import evaluate_files
-from placerec.experiments import Config, Results, experiment, report
-from placerec.experiments.claims import CLAIMS
-from placerec.experiments.tables import markdown, ranked
-from placerec.experiments.units import Unit
+from placerec.experiments.grid import Config, Results, experiment, report
+from placerec.experiments.grid.claims import CLAIMS
+from placerec.experiments.grid.tables import markdown, ranked
+from placerec.experiments.grid.units import Unit
+from placerec.figures import evaluate_files
 
 IMAGES = """
 [data]

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from helpers.small_experiment import CONFIG, write_grid
 
-from placerec.experiments import read_config
-from placerec.experiments.figure import draw_figure
-from placerec.experiments.results import Row, SequenceCount, Way, by_seed
+from placerec.experiments.grid import read_config
+from placerec.experiments.grid.figure import draw_figure
+from placerec.experiments.grid.results import Row, SequenceCount, Way, by_seed
 
 
 def row(seed: int, fold: str, right: int, order: int = 1) -> Row:

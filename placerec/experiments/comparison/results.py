@@ -1,0 +1,112 @@
+"""What came of a comparison of methods: a score each, intervals over the same draws, every pair; and their tables."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from placerec.evaluation.bootstrap import Pair, compare_pairs, count_blocks, draw, interval
+from placerec.evaluation.metrics import evaluate
+from placerec.experiments.comparison.benchmark import Run
+from placerec.experiments.comparison.material import Front
+
+
+@dataclass(frozen=True)
+class MethodScore:
+    """A line of methods.csv; shares from 0 to 1, `consulted` of the frames that asked a second cue."""
+
+    method: str
+    accuracy: float
+    accuracy_low: float
+    accuracy_high: float
+    balanced_accuracy: float
+    change_latency_frames: float | None
+    ece: float
+    microseconds_per_frame: float
+    consulted: float | None = None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What `compare` found; `drawn`: the intervals are over so many `sequences`, or `visits` of one sequence.
+
+    `front`: what comes before every method; `majority`: the share of the most frequent place among the test frames.
+    """
+
+    scores: tuple[MethodScore, ...]
+    pairs: tuple[Pair, ...]
+    frames: int
+    majority: float
+    majority_place: str
+    drawn: tuple[int, str]
+    front: Front
+
+
+def judge(runs: Mapping[str, Run], front: Front, seed: int) -> Comparison:
+    """The scores of all methods with intervals over the same draws, and every pair."""
+    evaluations = {name: evaluate(run.beliefs) for name, run in runs.items()}
+    counted = {name: count_blocks(run.beliefs) for name, run in runs.items()}
+    blocks, _ = next(iter(counted.values()))
+    right = {name: its for name, (_, its) in counted.items()}
+    drawn = draw(len(blocks.frames), seed)
+    scores = tuple(
+        MethodScore(
+            name,
+            evaluation.accuracy,
+            *interval(drawn, right[name], blocks.frames),
+            evaluation.balanced_accuracy,
+            evaluation.change_latency_frames,
+            evaluation.ece,
+            runs[name].microseconds,
+            runs[name].consulted,
+        )
+        for name, evaluation in evaluations.items()
+    )
+    one = next(iter(evaluations.values()))
+    return Comparison(
+        scores,
+        tuple(compare_pairs(right, blocks.frames, drawn)),
+        one.frames,
+        one.majority_accuracy,
+        one.majority_place,
+        (len(blocks.frames), blocks.what),
+        front,
+    )
+
+
+def format_methods(scores: Sequence[MethodScore]) -> str:
+    """The text of methods.csv."""
+    names = [name for name in MethodScore.__annotations__ if name != "consulted"]
+    lines = [",".join(names)]
+    for score in scores:
+        lines.append(",".join(_cell(name, getattr(score, name)) for name in names))
+    return "\n".join(lines) + "\n"
+
+
+def format_pairs(pairs: Sequence[Pair]) -> str:
+    """The text of pairs.csv: `holds` or `cannot tell`, see `Pair.holds`."""
+    lines = ["first,second,difference,difference_low,difference_high,verdict"]
+    for pair in pairs:
+        verdict = "holds" if pair.holds else "cannot tell"
+        lines.append(f"{pair.first},{pair.second},{pair.difference:.6f},{pair.low:.6f},{pair.high:.6f},{verdict}")
+    return "\n".join(lines) + "\n"
+
+
+def format_comparison(found: Comparison) -> str:
+    """A table for a terminal, best first, without a line end at its end."""
+    lines = [
+        f"{'method':<16}{'accuracy':>9}  {'95 % interval':>15}{'balanced':>10}{'latency':>9}{'ECE':>7}{'us/frame':>10}"
+    ]
+    for s in sorted(found.scores, key=lambda score: -score.accuracy):
+        latency = "-" if s.change_latency_frames is None else f"{s.change_latency_frames:g}"
+        lines.append(
+            f"{s.method:<16}{100 * s.accuracy:>7.1f} %  {100 * s.accuracy_low:>6.1f} - {100 * s.accuracy_high:>4.1f} %"
+            f"{100 * s.balanced_accuracy:>8.1f} %{latency:>9}{s.ece:>7.3f}{s.microseconds_per_frame:>10.1f}"
+        )
+    lines.append(f"{found.frames} frames; always {found.majority_place!r}: {100 * found.majority:.1f} %")
+    return "\n".join(lines)
+
+
+def _cell(name: str, value: Any) -> str:
+    if value is None or isinstance(value, str):
+        return value or ""
+    return f"{value:g}" if name == "change_latency_frames" else f"{value:.{2 if name.startswith('micro') else 6}f}"

@@ -1,0 +1,188 @@
+"""`placerec compare`: every method on the same recordings, at what cost, and whether the difference is real.
+
+OUT/methods.csv             a line per method
+OUT/pairs.csv               for every two methods whether their difference holds
+OUT/methods.png             accuracy against cost
+OUT/beliefs/METHOD/         the beliefs, one file per test sequence, and run.json: what they were made of
+OUT/cache/                  what a second run does not do again: descriptors, words, models
+"""
+
+import json
+import logging
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from placerec.errors import EvaluationError, OutputError, SourceError, check_optional
+from placerec.evaluation.bootstrap import LEAST
+from placerec.experiments.comparison.benchmark import ALL, CASCADE, Contest, Run, run_method, train_models
+from placerec.experiments.comparison.figure import plot_comparison
+from placerec.experiments.comparison.material import CENTRIST, GIST, digest, look
+from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
+from placerec.figures.panels import check_figure
+from placerec.files import held_folder, read_text, whole_folder, write_text
+from placerec.frames import Reading, find_sequences
+from placerec.frames import Sequence as FrameSequence
+from placerec.frames.naming import own_name, unique_names
+from placerec.hohmm import read_beliefs, write_beliefs
+from placerec.version import __version__
+
+ProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
+NEED_SKLEARN = ("ullah2008", "ullah2008-hmm", "knn")
+# The larger of the paper's two maps, with which it recognises rooms better.
+SIZE = 20
+RUN_JSON = "run.json"
+OWNED = ("*.tsv", RUN_JSON)
+log = logging.getLogger(__name__)
+
+
+def compare(
+    train: Iterable[Path | str],
+    test: Iterable[Path | str],
+    out: Path | str,
+    *,
+    methods: Iterable[str] | None = None,
+    size: int = SIZE,
+    seed: int = 0,
+    reading: Reading = Reading(),
+    cache: Path | str | None = None,
+    progress: ProgressBar = lambda label: nullcontext(lambda done, total: None),
+) -> Comparison:
+    """Learn on the sequences of `train` that `test` does not name, run every method on those of `test`, write `out`.
+
+    `size`, `seed`: of the dictionaries; the seed also draws prototypes and the bootstrap. What an earlier run into
+    `out` has done on the same data is kept; `cache`: the folder for it, by default in `out`. `progress(label)` is a
+    context manager that gives a callback(done, total). Raises EvaluationError for an unknown method and for sequences
+    that nothing can be compared on, MissingExtraError for what is not installed, and what `find_sequences` raises.
+    """
+    chosen = check_methods(methods)
+    _check_installed(chosen)
+    out = Path(out)
+    check_figure(out / "methods.png")
+    training, tests = _split(train, test, reading)
+    _make(out)
+    with held_folder(out):
+        cache = out / "cache" if cache is None else Path(cache)
+        looks = []
+        for spec in (GIST, CENTRIST)[: 1 + (CASCADE in chosen)]:
+            with progress(f"describe ({spec.kind})") as show:
+                one = look([*training, *tests], len(training), spec, size=size, seed=seed, cache=cache, progress=show)
+                looks.append(one)
+        models = train_models(looks[0], len(training), cache)
+        contest = Contest(looks[0], len(training), models, seed, *looks[1:])
+        runs = {}
+        with progress("methods") as show:
+            for done, name in enumerate(chosen, start=1):
+                runs[name] = _run(name, contest, out / "beliefs" / name)
+                show(done, len(chosen))
+        found = judge(runs, looks[0].front, seed)
+        write_text(out / "methods.csv", format_methods(found.scores))
+        write_text(out / "pairs.csv", format_pairs(found.pairs))
+        plot_comparison(found, out / "methods.png")
+    _tell(out, found)
+    return found
+
+
+def check_methods(methods: Iterable[str] | None = None) -> list[str]:
+    """The methods in the order of the table, all of them for None; EvaluationError for an unknown one or none."""
+    names = set(ALL if methods is None else methods)
+    for name in sorted(names):
+        if name not in ALL:
+            raise EvaluationError(f"no method is called {name!r}; choose from {', '.join(ALL)}")
+    if not names:
+        raise EvaluationError(f"no method is named; choose from {', '.join(ALL)}")
+    return [name for name in ALL if name in names]
+
+
+def _check_installed(names: Iterable[str]) -> None:
+    """Before any work: MissingExtraError for the first method that cannot run."""
+    for name in names:
+        if name in NEED_SKLEARN:
+            check_optional("sklearn", name, "leave it out of --methods")
+
+
+def _split(
+    train: Iterable[Path | str], test: Iterable[Path | str], reading: Reading
+) -> tuple[list[FrameSequence], list[FrameSequence]]:
+    """The sequences to learn from and to test on, under names that are unique among both."""
+    testing = find_sequences(test, reading=reading)
+    left_out = {sequence.source.resolve() for sequence in testing}
+    learning = [s for s in find_sequences(train, reading=reading) if s.source.resolve() not in left_out]
+    if not learning:
+        raise EvaluationError("every sequence is a test sequence, and none is left to learn from; name others")
+    both = [*learning, *testing]
+    if reading.labels and reading.labels.is_file() and sum(sequence.recording is not None for sequence in both) > 1:
+        what = "is one file, and training and test are several recordings"
+        raise SourceError(f"{reading.labels}: {what}; name a folder that holds NAME.labels for each")
+    names = unique_names([(own_name(s.source.resolve()), s.source) for s in both], SourceError)
+    both = [replace(sequence, name=name) for sequence, name in zip(both, names, strict=True)]
+    training, tests = both[: len(learning)], both[len(learning) :]
+    places = {frame.place for sequence in training for frame in sequence.frames} - {""}
+    if len(places) < 2:
+        raise EvaluationError(
+            f"the training sequences name {len(places)} places; label two at least to compare methods"
+        )
+    if not any(frame.place for sequence in tests for frame in sequence.frames):
+        raise EvaluationError(f"no frame of {tests[0].source} has a label, so nothing can be judged; label the tests")
+    return training, tests
+
+
+def _make(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{out}: cannot be written: {error.strerror or error}") from error
+
+
+def _run(name: str, contest: Contest, folder: Path) -> Run:
+    """The run in `folder` if it is one on the same data, or else a new one, which is left there."""
+    key = digest(
+        name,
+        contest.key,
+        contest.again.dictionary.fingerprint if contest.again and name == CASCADE else "",
+        __version__,
+    )
+    known = _facts(folder / RUN_JSON)
+    if known.get("key") == key:
+        log.info("%s: as the run before left it", name)
+        beliefs = [read_beliefs(folder / f"{contest.look.streams[i].name}.tsv") for i in contest.tests]
+        return Run(beliefs, known["microseconds_per_frame"], known["consulted"])
+    run = run_method(name, contest)
+    with whole_folder(folder, OWNED) as partial:
+        for beliefs_of_one in run.beliefs:
+            write_beliefs(partial / f"{beliefs_of_one.name}.tsv", beliefs_of_one)
+        facts = {"key": key, "method": name, "microseconds_per_frame": run.microseconds, "consulted": run.consulted}
+        write_text(partial / RUN_JSON, json.dumps(facts, indent=2) + "\n")
+    return run
+
+
+def _facts(path: Path) -> dict[str, Any]:
+    """What a run.json holds; nothing if there is none, or none that can be read."""
+    try:
+        facts = json.loads(read_text(path, EvaluationError)) if path.exists() else {}
+    except ValueError:
+        facts = {}
+    return facts if isinstance(facts, dict) else {}
+
+
+def _tell(out: Path, found: Comparison) -> None:
+    number, what = found.drawn
+    if what == "visits":
+        log.warning(
+            "one labelled test sequence: the intervals are over its %d visits, and say nothing of another recording",
+            number,
+        )
+    else:
+        log.info("%s: %d methods; intervals over %d test sequences", out, len(found.scores), number)
+    if number < LEAST:
+        log.warning("no difference between methods can hold with fewer than %d test %s", LEAST, what)
+    log.info(
+        "before every method a frame takes %.1f ms to describe and %.0f us to find its word, reading not counted",
+        found.front.descriptor / 1000,
+        found.front.word,
+    )
+    for score in found.scores:
+        if score.consulted is not None:
+            log.info("%s asked its second dictionary for %.0f %% of the frames", score.method, 100 * score.consulted)

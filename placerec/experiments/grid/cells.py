@@ -1,0 +1,207 @@
+"""Models and filtering: from the token streams of one fold to the results of all its cells.
+
+The numbers are those of `train-lm`, `decode` and `evaluate` on the same streams: the n-grams are counted once at the
+highest order, and the probabilities are rounded as ARPA files hold them.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.evaluation import evaluate
+from placerec.evaluation.metrics import change_latencies, codes, right_frames
+from placerec.experiments.grid import cache
+from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition
+from placerec.hohmm.evidence import evidence_in
+from placerec.hohmm.offline import believe
+from placerec.hohmm.recognizer import warn_of_strange_words
+from placerec.lm import BackoffModel, NgramCounts, count_ngrams
+from placerec.lm.trie import Trie
+from placerec.lm.union import unite_models
+from placerec.model import Corpus, Options, estimate_place, read_corpus
+from placerec.model.corpus import read_streams
+from placerec.words import Selection, WordStream, parse_selection, place_steps
+
+
+class Cell(NamedTuple):
+    """One way to make models and to filter with them; the selection is that of its `CellJob`."""
+
+    smoothing: str
+    order: int
+    transition: str
+
+
+@dataclass(frozen=True)
+class CellJob:
+    """The cells of one selection on one fold: `train` and `test` are token stream files.
+
+    The name of `kept`, where results are kept, says what streams and selection they are of.
+    """
+
+    train: tuple[Path, ...]
+    test: tuple[Path, ...]
+    select: str
+    cells: tuple[Cell, ...]
+    stay: float
+    per: str
+    kept: Path
+
+    def name(self, cell: Cell) -> str:
+        """What a cell is kept as: all that it depends on beside the job."""
+        filter_ = ("learned",) if cell.transition == "learned" else (cell.transition, f"{self.stay!r}", self.per)
+        return " ".join((cell.smoothing, str(cell.order), *filter_))
+
+
+def run_cells(job: CellJob) -> dict[str, Any]:
+    """The results of a job, by name of the cell, beside `data` (`describe_data`) and `frame-wise SMOOTHING`.
+
+    Only those are computed that are not kept already.
+    """
+    results = cache.load(job.kept)
+    missing = [cell for cell in job.cells if job.name(cell) not in results]
+    if missing:
+        results |= _computed(job, missing)
+        cache.save(job.kept, results)
+    return results
+
+
+def believe_cell(job: CellJob, cell: Cell) -> list[Beliefs]:
+    """The beliefs of one cell over the test sequences, computed anew."""
+    return next(_believed(job, _read(job, [cell]), [cell]))[1]
+
+
+@dataclass(frozen=True)
+class _Streams:
+    """What a job's files hold; counts of n-grams per place, with selection, and of words alone without."""
+
+    corpus: Corpus
+    training: list[WordStream]
+    tests: list[WordStream]
+    counts: list[NgramCounts]
+    words: list[NgramCounts]
+
+
+def _read(job: CellJob, cells: Sequence[Cell]) -> _Streams:
+    corpus = read_corpus(job.train, selection=parse_selection(job.select))
+    whole = read_corpus(job.train, selection=Selection())
+    counts = _counts(corpus, max(cell.order for cell in cells))
+    return _Streams(corpus, read_streams(job.train), read_streams(job.test), counts, _counts(whole, 1))
+
+
+def _computed(job: CellJob, cells: Sequence[Cell]) -> dict[str, Any]:
+    streams = _read(job, cells)
+    listed = frozenset(streams.corpus.vocabulary)
+    for stream in streams.tests:
+        warn_of_strange_words(stream, listed)
+    results: dict[str, Any] = {"data": describe_data(streams.training, streams.tests)}
+    for smoothing in dict.fromkeys(cell.smoothing for cell in cells):
+        results[f"frame-wise {smoothing}"] = _frame_wise(streams, smoothing)
+    return results | {job.name(cell): judged(beliefs) for cell, beliefs in _believed(job, streams, cells)}
+
+
+def _believed(job: CellJob, streams: _Streams, cells: Sequence[Cell]) -> Iterator[tuple[Cell, list[Beliefs]]]:
+    """The cells and their beliefs; models are made once for all transitions."""
+    selection = parse_selection(job.select)
+    for (smoothing, order), same in groupby(sorted(cells), lambda cell: cell[:2]):
+        union = _models(streams.counts, smoothing, order)
+        for cell in same:
+            transition = _transition(cell.transition, streams, job)
+            yield cell, [_filtered(test, union, streams.corpus, selection, transition) for test in streams.tests]
+
+
+def _counts(corpus: Corpus, order: int) -> list[NgramCounts]:
+    sentences = corpus.sentences.values()
+    return [count_ngrams(text, order, vocabulary=corpus.vocabulary, markers=False) for text in sentences]
+
+
+def _models(counts: Sequence[NgramCounts], smoothing: str, order: int) -> Emissions:
+    options = Options(order=order, smoothing=smoothing)
+    return unite_models([_printed(estimate_place(up_to(one, order), options)) for one in counts])
+
+
+def up_to(counts: NgramCounts, order: int) -> NgramCounts:
+    """The counts of the orders up to `order` alone."""
+    keys = counts.trie.keys[:order]
+    return NgramCounts(Trie(counts.trie.vocabulary, keys), counts.counts[:order], counts.seen[:order])
+
+
+def _printed(model: BackoffModel) -> BackoffModel:
+    log10_ps, backoffs = (tuple(map(seven_digits, values)) for values in (model.log10_ps, model.backoffs))
+    return BackoffModel(model.trie, log10_ps, backoffs)
+
+
+def seven_digits(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The numbers as they come back from an ARPA file, where they have seven significant digits."""
+    exact = values.astype(np.float64)
+    rounded = np.isfinite(exact) & (exact != 0)
+    unit = 10.0 ** (6 - np.floor(np.log10(np.abs(exact, where=rounded, out=np.ones_like(exact)))))
+    return np.where(rounded, np.rint(exact * unit) / unit, exact).astype(np.float32)
+
+
+def _transition(name: str, streams: _Streams, job: CellJob) -> Transition:
+    places = list(streams.corpus.sentences)
+    if name == "fixed":
+        return fixed_transition(len(places), job.stay, job.per)
+    return learned_transition(np.sum([place_steps(stream, places) for stream in streams.training], axis=0))
+
+
+def _filtered(
+    stream: WordStream, union: Emissions, corpus: Corpus, selection: Selection, transition: Transition
+) -> Beliefs:
+    listed = frozenset(corpus.vocabulary)
+    parts = evidence_in(stream, union, listed, selection=selection, per=transition.per, max_gap=None)
+    evidence = next(parts)
+    belief, _ = believe(evidence, transition)
+    return Beliefs.of(stream, tuple(corpus.sentences), belief, selected=evidence.selected)
+
+
+def _frame_wise(streams: _Streams, smoothing: str) -> dict[str, int]:
+    """Frames of each sequence that their own word alone gets right: naive Bayes, no filter, no selection."""
+    union, places = _models(streams.words, smoothing, 1), list(streams.corpus.sentences)
+    listed = frozenset(streams.corpus.vocabulary)
+    right = {}
+    for stream in streams.tests:
+        known = np.array([word in listed for word in stream.words], bool)
+        log10_p = union.score([word for word in stream.words if word in listed])
+        best = np.array([places[i] for i in log10_p.argmax(axis=1).tolist()], np.str_)
+        right[stream.name] = int((best == np.array(stream.places, np.str_)[known]).sum())
+    return right
+
+
+def judged(beliefs: Sequence[Beliefs]) -> dict[str, Any]:
+    """What is kept of an evaluation, in plain values."""
+    found = evaluate(beliefs)
+    return {
+        "frames": found.frames,
+        "accuracy": found.accuracy,
+        "balanced_accuracy": found.balanced_accuracy,
+        "majority_accuracy": found.majority_accuracy,
+        "change_latency_frames": found.change_latency_frames,
+        "log_loss": found.log_loss,
+        "ece": found.ece,
+        "sequences": {one.name: _counts_of(one) for one in beliefs},
+        "majority": {one.name: one.truth.count(found.majority_place) for one in beliefs},
+    }
+
+
+def _counts_of(one: Beliefs) -> list[int]:
+    """The labelled frames of a sequence, how many of them were decided rightly, and how many late."""
+    truth, right = codes(one.truth, sorted({*one.truth} - {""})), right_frames(one)
+    return [int((truth >= 0).sum()), int(right.sum()), int(change_latencies(truth, right).sum())]
+
+
+def describe_data(training: Sequence[WordStream], tests: Sequence[WordStream]) -> dict[str, Any]:
+    """Labelled images per place, and the mean run of equal words in training (readings A30)."""
+    frames = sum(len(stream) for stream in training)
+    runs = sum(1 + sum(a != b for a, b in zip(stream.words, stream.words[1:], strict=False)) for stream in training)
+    return {"same_word_run": frames / runs, "train": _images(training), "test": _images(tests)}
+
+
+def _images(streams: Sequence[WordStream]) -> dict[str, int]:
+    labels = [place for stream in streams for place in stream.places if place]
+    return {place: labels.count(place) for place in sorted(set(labels))}

@@ -1,0 +1,296 @@
+"""The paper's claims O1 to O11 (readings 2.1), each judged by numbers and intervals.
+
+A claim is made of statements, each a difference of accuracies in points (percent of the frames) and a threshold. It
+holds if the whole 95 % interval is on the claimed side, it does not hold if the whole interval is on the other side.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from placerec.evaluation.bootstrap import LEAST, Floats, middle
+from placerec.experiments.grid.bootstrap import MissingCellsError, Scores, mean, scores
+from placerec.experiments.grid.results import Results
+
+HOLDS, FAILS, UNKNOWN = "holds", "does not hold", "cannot tell"
+# Points: what counts as several percent, as no more than a little, and as among the best.
+SEVERAL, LITTLE, AMONG = 2.0, 2.0, 1.0
+HIGH = 80.0
+NONE, THREE, FIVE, COMPRESS, UNIQUE = "none", "subsample:3", "subsample:5", "compress:3", "unique"
+# Of the smoothings in a grid, the first of these stands for the paper's (readings A11, A12).
+WITTEN_BELL = ("witten-bell", "witten-bell-backoff")
+LIDSTONE = ("lidstone-backoff", "lidstone")
+
+
+@dataclass(frozen=True)
+class Statement:
+    """`text` says what `values` (1 + DRAWS,) are, in points; they should be `above` the threshold, `below` or `within`.
+
+    `values` is None where the grid lacks cells, and holds the number alone where there is nothing to draw. A `reason`
+    says why there is no verdict.
+    """
+
+    text: str
+    values: Floats | None
+    side: str = "above"
+    threshold: float = 0.0
+    reason: str = ""
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The 95 % interval."""
+        if self.values is None or len(self.values) == 1:
+            return None
+        return middle(self.values[1:], float(self.values[0]))
+
+    @property
+    def verdict(self) -> str:
+        """HOLDS, FAILS or UNKNOWN."""
+        if self.reason or self.interval is None:
+            return UNKNOWN
+        (low, high), t = self.interval, self.threshold
+        if self.side == "within":
+            return HOLDS if -t < low and high < t else FAILS if low >= t or high <= -t else UNKNOWN
+        if self.side == "below":
+            low, high, t = -high, -low, -t
+        return HOLDS if low > t else FAILS if high <= t else UNKNOWN
+
+    @property
+    def wanted(self) -> str:
+        """The threshold in words."""
+        return f"{self.side} {'±' if self.side == 'within' else ''}{self.threshold:g}"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One of the paper's claims, judged."""
+
+    name: str
+    text: str
+    statements: Sequence[Statement]
+
+    @property
+    def verdict(self) -> str:
+        """HOLDS if all statements hold, FAILS if one does not."""
+        verdicts = [statement.verdict for statement in self.statements]
+        return FAILS if FAILS in verdicts else UNKNOWN if UNKNOWN in verdicts else HOLDS
+
+
+def judge(results: Results, transition: str) -> list[Claim]:
+    """All claims, by the cells with these transitions and the paper's smoothings (all, if the grid has none)."""
+    rows = [row for row in results.rows if row.transition == transition]
+    paper = {name for family in (WITTEN_BELL, LIDSTONE) for name in family[:1] if name in {r.smoothing for r in rows}}
+    found = scores([row for row in rows if row.smoothing in paper or not paper])
+    reason = ""
+    if len(found.sequences) < LEAST:
+        number = len(found.sequences)
+        reason = f"{number} test sequence{'s' * (number != 1)}; a verdict needs {LEAST} or more"
+    return [Claim(name, text, _stated(statements, found, reason)) for name, text, statements in CLAIMS]
+
+
+def _stated(statements: Callable[[Scores], list["Lazy"]], found: Scores, reason: str) -> list[Statement]:
+    stated = []
+    for lazy in statements(found):
+        try:
+            values = lazy.values() if len(found.sequences) > 1 else lazy.values()[:1]
+            stated.append(Statement(lazy.text, values, lazy.side, lazy.threshold, reason))
+        except MissingCellsError as error:
+            stated.append(Statement(lazy.text, None, lazy.side, lazy.threshold, str(error)))
+    return stated
+
+
+@dataclass(frozen=True)
+class Lazy:
+    """A statement whose values are still to be asked of the grid."""
+
+    text: str
+    values: Callable[[], Floats]
+    side: str = "above"
+    threshold: float = 0.0
+
+
+def _at_20(s: Scores, family: Sequence[str], select: str) -> Floats:
+    """The cells of S = 20, a family of smoothings and a selection."""
+    return s.take(size=[20], smoothing=[_one_of(s, family)], select=[select])
+
+
+def _one_of(s: Scores, family: Sequence[str]) -> str:
+    """The grid's smoothing of a family; MissingCellsError if there is none."""
+    for name in family:
+        if name in s.smoothing:
+            return name
+    raise MissingCellsError(f"the grid has no smoothing {' or '.join(family)}")
+
+
+def _gain(s: Scores, select: Sequence[str], *, over: str = NONE, order: Sequence[int] | None = None) -> Floats:
+    """What selections gain over another, cell by cell."""
+    return s.take(select=select, order=order) - s.take(select=[over], order=order)
+
+
+def _slope(s: Scores, cells: Floats) -> Floats:
+    """Points per step of n, by least squares over the mean at each order: (a, b, c, d, draws) to (draws,)."""
+    if len(s.order) < 2:
+        raise MissingCellsError("the grid has one order only")
+    n = np.array(s.order, np.float64) - np.mean(s.order)
+    slope: Floats = np.einsum("d,dn->n", n / (n @ n), cells.mean(axis=(0, 1, 2)))
+    return slope
+
+
+def _highest(cells: Floats) -> Floats:
+    """The cell that is best on all sequences, (draws,): chosen once, not anew in every draw."""
+    flat = cells.reshape(-1, cells.shape[-1])
+    best: Floats = flat[int(flat[:, 0].argmax())]
+    return best
+
+
+def _others(s: Scores, without: str) -> list[str]:
+    return [name for name in s.select if name != without]
+
+
+def _spread(s: Scores, select: str) -> Floats:
+    """How far the accuracies of n >= 2 lie apart, mean over sizes and smoothings."""
+    orders = [n for n in s.order if n > 1]
+    if len(orders) < 2:
+        raise MissingCellsError("the grid has no two orders above 1")
+    apart: Floats = np.ptp(s.take(select=[select], order=orders), axis=3).mean(axis=(0, 1, 2))
+    return apart
+
+
+def _o1(s: Scores) -> list[Lazy]:
+    def values() -> Floats:
+        if len(s.size) < 2:
+            raise MissingCellsError("the grid has one size only")
+        return mean(s.take(size=[s.size[-1]]) - s.take(size=[s.size[0]]))
+
+    return [Lazy(f"S = {s.size[-1]} minus S = {s.size[0]}, mean over all cells", values)]
+
+
+def _o2(s: Scores) -> list[Lazy]:
+    def values() -> Floats:
+        return mean(_gain(s, _others(s, NONE)))
+
+    text = "selection minus none, mean over selections and all cells"
+    return [Lazy(text, values), Lazy(f"{text}: several percent", values, "above", SEVERAL)]
+
+
+def _o3(s: Scores) -> list[Lazy]:
+    return [
+        Lazy("s = 3 minus none, mean over all cells", lambda: mean(_gain(s, [THREE]))),
+        Lazy("s = 3 minus none, in the cell where it gains most", lambda: _highest(_gain(s, [THREE])), "above", 6.0),
+    ]
+
+
+def _o4(s: Scores) -> list[Lazy]:
+    def best() -> Floats:
+        own, others = _highest(_at_20(s, WITTEN_BELL, FIVE)), s.accuracy.copy()
+        there = s.size.index(20), s.smoothing.index(_one_of(s, WITTEN_BELL)), s.select.index(FIVE)
+        others[there] = 0
+        return own - _highest(others)
+
+    return [
+        Lazy("s = 5 minus s = 3, mean over all cells", lambda: mean(_gain(s, [FIVE], over=THREE)), "below"),
+        Lazy(
+            "S = 20, Lidstone: s = 5 minus none, mean over n",
+            lambda: mean(_at_20(s, LIDSTONE, FIVE) - _at_20(s, LIDSTONE, NONE)),
+            "below",
+        ),
+        Lazy("S = 20, Witten-Bell: the best n with s = 5 minus the best of all other cells", best),
+    ]
+
+
+def _o5(s: Scores) -> list[Lazy]:
+    def elsewhere() -> Floats:
+        gain = _gain(s, [COMPRESS])
+        pairs = [(size, name) for size in s.size for name in s.smoothing]
+        kept = np.array([not (size == 20 and name in WITTEN_BELL) for size, name in pairs], bool)
+        if not kept.any():
+            raise MissingCellsError("the grid has nothing but S = 20 with Witten-Bell")
+        average: Floats = gain[kept.reshape(gain.shape[:2])].mean(axis=(0, 1, 2))
+        return average
+
+    return [
+        Lazy("compress minus none, mean over all cells but S = 20 with Witten-Bell", elsewhere),
+        Lazy(
+            "S = 20, Witten-Bell: compress minus none, mean over n",
+            lambda: mean(_at_20(s, WITTEN_BELL, COMPRESS) - _at_20(s, WITTEN_BELL, NONE)),
+            "below",
+            AMONG,
+        ),
+    ]
+
+
+def _o6(s: Scores) -> list[Lazy]:
+    def gap() -> Floats:
+        others = _others(s, UNIQUE)
+        best = s.take(select=others).max(axis=2, keepdims=True)
+        behind = s.take(select=[UNIQUE]) - best
+        return -_highest(-behind)
+
+    def spread() -> Floats:
+        own = _spread(s, UNIQUE)
+        others = [_spread(s, name) for name in _others(s, UNIQUE)]
+        if not others:
+            raise MissingCellsError("the grid has no other selection")
+        least: Floats = np.min(others, axis=0)
+        return own - least
+
+    return [
+        Lazy("unique minus the best other strategy, in the cell where it is worst", gap, "above", -AMONG),
+        Lazy("spread over n >= 2 with unique minus the smallest of the other strategies", spread, "below"),
+    ]
+
+
+def _o7(s: Scores) -> list[Lazy]:
+    return [
+        Lazy("what selection gains over none, more for each step of n", lambda: _slope(s, _gain(s, _others(s, NONE))))
+    ]
+
+
+def _o8(s: Scores) -> list[Lazy]:
+    def difference() -> Floats:
+        one, other = (_one_of(s, family) for family in (WITTEN_BELL, LIDSTONE))
+        return s.take(smoothing=[one]) - s.take(smoothing=[other])
+
+    return [
+        Lazy("Witten-Bell minus Lidstone, mean over all cells", lambda: mean(difference())),
+        Lazy("Witten-Bell minus Lidstone, more for each step of n", lambda: _slope(s, difference())),
+    ]
+
+
+def _o9(s: Scores) -> list[Lazy]:
+    return [Lazy("n = 2 minus n = 1, mean over all cells", lambda: mean(s.take(order=[2]) - s.take(order=[1])))]
+
+
+def _o10(s: Scores) -> list[Lazy]:
+    above = [n for n in s.order if n > 2]
+
+    def change(select: Sequence[str] | None) -> Floats:
+        return mean(s.take(order=above, select=select) - s.take(order=[2], select=select))
+
+    return [
+        Lazy("n > 2 minus n = 2, mean over all cells", lambda: change(None), "within", LITTLE),
+        Lazy("without selection: n > 2 minus n = 2, mean over sizes and smoothings", lambda: change([NONE]), "below"),
+    ]
+
+
+def _o11(s: Scores) -> list[Lazy]:
+    return [
+        Lazy("frames right in the best cell, percent", lambda: _highest(s.accuracy), "above", HIGH),
+        Lazy("the best cell minus always the most frequent place", lambda: _highest(s.accuracy) - s.majority),
+    ]
+
+
+CLAIMS: tuple[tuple[str, str, Callable[[Scores], list[Lazy]]], ...] = (
+    ("O1", "A larger map gives better results.", _o1),
+    ("O2", "Word selection generally increases the results by several percent.", _o2),
+    ("O3", "Subsample with s = 3 is efficient, sometimes by 6 %.", _o3),
+    ("O4", "s = 5 gains less; with S = 20 it loses with Lidstone and is best of all with Witten-Bell.", _o4),
+    ("O5", "Compress is usually efficient, except with S = 20 and Witten-Bell.", _o5),
+    ("O6", "Unique is always among the best, and least sensitive to n.", _o6),
+    ("O7", "The effect of selection grows with n.", _o7),
+    ("O8", "Witten-Bell is slightly better than Lidstone, mainly for large n.", _o8),
+    ("O9", "n = 2 is a clear improvement over n = 1.", _o9),
+    ("O10", "n > 2 has little effect; without selection results drop.", _o10),
+    ("O11", "Recognition rates are already quite high.", _o11),
+)

@@ -1,0 +1,80 @@
+"""The paper's figure: a panel per map size and smoothing, bars of accuracy by n for each selection."""
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import product
+from operator import attrgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from placerec.experiments.grid.config import Config
+from placerec.experiments.grid.results import Row, Way, by_seed, way_of
+from placerec.figures import figure_file
+from placerec.figures.panels import place_colours
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Inches.
+_PANEL_WIDTH, _PANEL_HEIGHT = 6.4, 3.1
+_BASELINES = (
+    ("majority", "always the most frequent place", ":"),
+    ("frame_wise", "each frame alone (naive Bayes)", "--"),
+)
+
+
+def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, narrow: bool = False) -> None:
+    """Draw the rows of one kind of transition: bars are means over seeds, the lines on them one standard deviation.
+
+    Sizes are rows and smoothings columns of panels; `narrow`: all in one column. PNG or SVG by suffix;
+    MissingExtraError without matplotlib.
+    """
+    panels = list(product(plan.size, plan.smoothing))
+    columns = 1 if narrow else len(plan.smoothing)
+    lines = len(panels) // columns
+    accuracy = by_seed(rows)
+    baselines = {kind: by_seed(rows, attrgetter(kind)) for kind, _, _ in _BASELINES}
+    values = [np.mean(seeds) for table in (accuracy, *baselines.values()) for seeds in table.values()]
+    lowest = max(0, 10 * math.floor(10 * min(values)) - 10)
+    width = 4.6 if narrow else _PANEL_WIDTH * columns
+    with figure_file(path, width, _PANEL_HEIGHT * lines + (1.6 if narrow else 1.0)) as figure:
+        figure.set_layout_engine("constrained")
+        grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
+        for axes, (size, smoothing) in zip(grid.ravel(), panels, strict=True):
+            own = [row for row in rows if (row.size, row.smoothing) == (size, smoothing)]
+            _bars(axes, own, plan, accuracy)
+            _lines(axes, own, baselines)
+            axes.set_title(f"S = {size}, {smoothing}", loc="left", fontsize=10)
+            axes.set_ylim(lowest, 100)
+        for axes in grid[:, 0]:
+            axes.set_ylabel("frames right, %" + (f" (axis from {lowest})" if lowest else ""), fontsize=8.5)
+        handles, labels = grid[0][0].get_legend_handles_labels()
+        across = 2 if narrow else min(4, len(labels))
+        figure.legend(handles, labels, loc="outside lower center", ncols=across, frameon=False, fontsize=8.5)
+        figure.suptitle(title, fontsize=11)
+
+
+def _bars(axes: "Axes", rows: Sequence[Row], plan: Config, accuracy: Mapping[Way, Sequence[float]]) -> None:
+    size, smoothing, transition = rows[0].size, rows[0].smoothing, rows[0].transition
+    selects, orders = plan.select, sorted(plan.order)
+    wide = 0.85 / len(selects)
+    colours = place_colours(selects)
+    for number, select in enumerate(selects):
+        seeds = [np.array(accuracy[Way(size, smoothing, select, order, transition)]) * 100 for order in orders]
+        left = np.arange(len(orders)) + wide * (number - (len(selects) - 1) / 2)
+        heights, errors = [one.mean() for one in seeds], [one.std(ddof=1) if len(one) > 1 else 0 for one in seeds]
+        error: Any = {"elinewidth": 0.8, "capsize": 1.5, "ecolor": "0.2"}
+        paint: Any = {"color": tuple(colours[number]), "edgecolor": "0.3", "linewidth": 0.4}
+        axes.bar(left, heights, wide, yerr=errors, error_kw=error, label=select, **paint)
+    axes.set_xticks(range(len(orders)), labels=[f"n = {order}" for order in orders], fontsize=8.5)
+    axes.tick_params(axis="y", labelsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _lines(axes: "Axes", rows: Sequence[Row], baselines: Mapping[str, Mapping[Way, Sequence[float]]]) -> None:
+    ways = {way_of(row) for row in rows}
+    for kind, label, style in _BASELINES:
+        height = 100 * float(np.mean([np.mean(baselines[kind][way]) for way in sorted(ways)]))
+        axes.axhline(height, linestyle=style, color="black", linewidth=1.1, label=label)

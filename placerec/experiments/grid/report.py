@@ -1,0 +1,224 @@
+"""The report of an experiment: figure, tables and claims as files, and one page that shows all of it."""
+
+import platform
+import shlex
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from placerec.errors import ExperimentError
+from placerec.evaluation import Evaluation, evaluate
+from placerec.experiments.grid import cache
+from placerec.experiments.grid.cells import Cell, believe_cell
+from placerec.experiments.grid.claims import judge
+from placerec.experiments.grid.commands import commands_of
+from placerec.experiments.grid.config import Config
+from placerec.experiments.grid.figure import draw_figure
+from placerec.experiments.grid.results import Results, Way
+from placerec.experiments.grid.tables import (
+    Table,
+    best_table,
+    claims_table,
+    format_claims,
+    format_tables,
+    images_table,
+    ranked,
+    reading,
+    runs_table,
+    verdicts_table,
+)
+from placerec.experiments.grid.tokens import draw_words
+from placerec.experiments.grid.units import Unit
+from placerec.figures import (
+    belief_strip,
+    confusion_panel,
+    figure_file,
+    heading,
+    html_page,
+    legend_panel,
+    paragraph,
+    picture,
+    preformatted,
+    table,
+)
+from placerec.figures.panels import strip_title
+from placerec.files import read_text, write_text
+from placerec.hohmm import Beliefs
+from placerec.version import __version__
+
+_PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib")
+
+
+def write_reports(results: Results, plan: Config, config: Path, units: Sequence[Unit], out: Path) -> None:
+    """Write figure.png and figure.svg, tables.md, claims.md and report.html into `out`, unless they are there already.
+
+    With more than one kind of transitions the first of the config has the figure, others figure-NAME. Raises
+    MissingExtraError without matplotlib.
+    """
+    record, key = out / "cache" / "report.json", _key(config, units, out)
+    if cache.load(record) != {"key": key, "files": _contents(out)}:
+        _write(results, plan, config, units, out)
+        cache.save(record, {"key": key, "files": _contents(out)})
+
+
+def _key(config: Path, units: Sequence[Unit], out: Path) -> str:
+    """What all that is written here depends on."""
+    rows = [cache.content_of(out / name) for name in ("results.csv", "sequences.csv")]
+    made_of = [(unit.job.kept.name, unit.images.folder.name if unit.images else "") for unit in units]
+    return cache.key_of("report", rows, made_of, str(config), read_text(config, ExperimentError), str(out), _versions())
+
+
+def _contents(out: Path) -> dict[str, str]:
+    paths = sorted(path for pattern in ("*.md", "*.html", "figure*") for path in out.glob(pattern))
+    return {path.name: cache.content_of(path) for path in paths}
+
+
+def _write(results: Results, plan: Config, config: Path, units: Sequence[Unit], out: Path) -> None:
+    note = reading(len({name for row in results.rows for name in row.sequences}), plan.seeds)
+    claims = {transition: judge(results, transition) for transition in plan.transition}
+    write_text(out / "tables.md", format_tables(results))
+    write_text(out / "claims.md", format_claims(claims, note))
+    body = [
+        paragraph(_what(results, plan, config)),
+        heading("Frames right"),
+        *_figures(results, plan, out),
+        _table(best_table(results), "The ten best of the grid, with what is right without any filter."),
+        heading("The paper's claims"),
+        _table(verdicts_table(claims), "Verdicts; the numbers are below."),
+        paragraph(note),
+    ]
+    for transition, judged in claims.items():
+        body += [_table(claims_table(judged), f"With {transition} transitions.")]
+    body += [
+        heading("The data"),
+        _table(images_table(results.folds), "Labelled images per place and split."),
+        _table(runs_table(results.rows), "Frames in a row with the same word, in training."),
+        *_closer_look(results, units),
+        heading("Do it again"),
+        preformatted(f"placerec experiment {shlex.quote(config.name)} -o {shlex.quote(out.resolve().name)}/"),
+        paragraph(f"{config.name}:"),
+        preformatted(read_text(config, ExperimentError)),
+        paragraph(f"The best way of the grid, step by step ({ranked(results)[0]}; seed 0):"),
+        preformatted(commands_of(plan, ranked(results)[0], _of(units, ranked(results)[0])[0])),
+        preformatted(_versions()),
+    ]
+    write_text(out / "report.html", html_page(f"placerec experiment: {config.stem}", body))
+
+
+_CAPTION = "Mean over seeds, with one standard deviation. Dotted: always the most frequent place. Dashed: naive Bayes."
+
+
+def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
+    """Draw the paper's figure for each kind of transitions, as PNG and SVG."""
+    for old in out.glob("figure-*"):
+        old.unlink()
+    for number, transition in enumerate(plan.transition):
+        rows, title = [row for row in results.rows if row.transition == transition], f"{transition} transitions"
+        path = out / f"figure{f'-{transition}' if number else ''}.svg"
+        draw_figure(rows, plan, path, title=title)
+        draw_figure(rows, plan, path.with_suffix(".png"), title=title)
+        with tempfile.TemporaryDirectory() as folder:
+            narrow = Path(folder) / "narrow.png"
+            draw_figure(rows, plan, narrow, title=title, narrow=True)
+            yield picture(path.with_suffix(".png"), f"Bars of accuracy by n, {title}", _CAPTION, narrow=narrow)
+
+
+def _what(results: Results, plan: Config, config: Path) -> str:
+    frames = {name: sum(fold.test.values()) for name, fold in results.folds.items()}
+    source = f"the token streams {plan.tokens}" if plan.tokens else f"the images of {', '.join(plan.sequences)}"
+    split = plan.split or f"tests are {', '.join(plan.test)}"
+    return (
+        f"{len(results.rows)} results of {config.name} on {source} ({split}): {len(frames)} fold"
+        f"{'s' * (len(frames) != 1)}, {sum(frames.values())} labelled test frames, {plan.seeds} "
+        f"seed{'s' * (plan.seeds != 1)}. All rows are in results.csv, those of each test sequence in sequences.csv."
+    )
+
+
+def _table(content: Table, caption: str) -> str:
+    header, lines = content
+    return table(header, lines, caption)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A way with seed 0, its beliefs over the test sequences of all folds, and their evaluation."""
+
+    way: Way
+    beliefs: list[Beliefs]
+    evaluation: Evaluation
+
+
+def _of(units: Sequence[Unit], way: Way) -> list[Unit]:
+    """The units of a way with seed 0, one per fold."""
+    return [unit for unit in units if (unit.size, unit.seed, unit.job.select) == (way.size, 0, way.select)]
+
+
+def _look(units: Sequence[Unit], way: Way) -> _Look:
+    cell = Cell(way.smoothing, way.order, way.transition)
+    beliefs = [one for unit in _of(units, way) for one in believe_cell(unit.job, cell)]
+    return _Look(way, beliefs, evaluate(beliefs))
+
+
+def _closer_look(results: Results, units: Sequence[Unit]) -> Iterator[str]:
+    """Belief strips and confusion matrices of the best way, and its words."""
+    best = _look(units, ranked(results)[0])
+    first = best.way._replace(order=min(row.order for row in results.rows))
+    looks = [best] if first == best.way else [best, _look(units, first)]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        yield heading("Belief over time")
+        caption = f"The sequences with the most and the fewest frames right: {best.way}, seed 0."
+        strips = _strips(best, folder / "strips.png", 11)
+        narrow = _strips(best, folder / "narrow.png", 5)
+        yield picture(strips, "Beliefs of two test sequences", caption, narrow=narrow)
+        yield heading("What is confused")
+        for number, look in enumerate(looks):
+            path = folder / f"confusion{number}.png"
+            yield picture(_confusion(look, path), "Confusion matrix", f"{look.way}, seed 0, all folds.")
+        images = _of(units, best.way)[0].images
+        if images is not None:
+            yield heading("The words")
+            draw_words(images, folder / "words.png")
+            caption = f"The words of S = {best.way.size}, seed 0, among the test frames of the first fold."
+            yield picture(folder / "words.png", "For each word a typical frame", caption)
+
+
+def _strips(look: _Look, path: Path, width: float) -> Path:
+    """The best and the worst sequence; `width` in inches."""
+    scores = look.evaluation.sequences
+    judged = [one for one in look.beliefs if scores[one.name].accuracy is not None]
+    order = sorted(judged, key=lambda one: scores[one.name].accuracy or 0.0)
+    shown = list({one.name: one for one in (order[-1], order[0])}.values())
+    with figure_file(path, width, 0.9 + 2.0 * len(shown)) as figure:
+        figure.set_layout_engine("constrained")
+        *strips, legend = figure.subplots(
+            len(shown) + 1, 1, height_ratios=[1.0] * len(shown) + [0.12 * (2 + len(look.evaluation.places) // 2)]
+        )
+        for axes, one in zip(strips, shown, strict=True):
+            title = strip_title(one.name, scores[one.name].accuracy)
+            belief_strip(axes, one, places=look.evaluation.places, title=title)
+        legend_panel(legend, look.evaluation.places)
+    return path
+
+
+def _confusion(look: _Look, path: Path) -> Path:
+    side = 2.0 + 0.5 * len(look.evaluation.places)
+    with figure_file(path, side + 1.0, side) as figure:
+        figure.set_layout_engine("constrained")
+        confusion_panel(figure.subplots(), look.evaluation)
+    return path
+
+
+def _versions() -> str:
+    lines = [
+        f"placerec {__version__}",
+        f"Python {platform.python_version()} on {platform.system()} {platform.machine()}",
+    ]
+    for package in _PACKAGES:
+        try:
+            lines.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            lines.append(f"{package}: not known")
+    return "\n".join(lines)

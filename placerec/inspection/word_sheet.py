@@ -1,0 +1,216 @@
+"""One sheet of all words: the typical frame of every unit on the lattice of the map, framed in its place's colour."""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.evaluation.summary import shorten
+from placerec.figures.panels import figure_file, letter_colour, place_colours
+from placerec.frames.sequence import Gray
+from placerec.inspection.words import WordTable, word_sentences
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Inches.
+_MARGIN, _SIDE, _GAP, _ROW = 0.3, 3.6, 0.5, 0.2
+_LEAST_WIDTH = 10.0
+# Pixels across a tile in the picture; the rest of a tile's cell, in shares of its width, is frame and bar.
+_PIXELS = 128
+_FRAME, _BAR = 0.05, 0.09
+_UNLABELLED, _EMPTY, _PAPER = (0.62, 0.62, 0.62), (0.93, 0.93, 0.93), (1.0, 1.0, 1.0)
+_READING = (
+    "Tiles lie as the units do on the map: the nearest frame to the unit, framed in the colour of the place that most "
+    "frames of the word have (its number in the corner); right: training frames that hit the unit; bar below: its "
+    "frames by place. Blank: the word of no frame here; crossed: hit by no training frame. "
+    "U-matrix: the mean distance of a unit to the four around it."
+)
+
+
+@dataclass(frozen=True)
+class _Tiles:
+    """A lattice of cells, in inches: a cell is `width` x `height`, its picture `inner` x `inner * aspect`."""
+
+    size: int
+    width: float
+    aspect: float
+
+    @property
+    def inner(self) -> float:
+        return self.width * (1 - 2 * _FRAME)
+
+    @property
+    def height(self) -> float:
+        return self.inner * self.aspect + self.width * (2 * _FRAME + _BAR)
+
+
+def draw_word_sheet(table: WordTable, images: Mapping[int, Gray], path: Path | str, *, title: str) -> None:
+    """Draw the words as one picture, PNG, SVG or PDF by suffix; `images`: each unit's typical frame, if it has one.
+
+    Raises OutputError for another suffix or a path that cannot be written, MissingExtraError without matplotlib.
+    """
+    pictures = [images.get(unit) for unit in range(len(table.words))]
+    shapes = [picture.shape for picture in pictures if picture is not None]
+    aspect = float(np.clip(np.median([height / width for height, width in shapes]), 0.5, 1.5))
+    # Big enough to be recognised, as long as the sheet can be opened at all.
+    tiles = _Tiles(table.size, min(1.6, max(0.8, 5 / table.size), 32 / table.size), aspect)
+    lattice = tiles.width * table.size, tiles.height * table.size
+    width = max(_LEAST_WIDTH, 2 * _MARGIN + 0.3 + lattice[0] + _GAP + _SIDE)
+    lines = [line for text in (*word_sentences(table), _READING) for line in _wrapped(text, width - 2 * _MARGIN, 8.5)]
+    head = 0.62 + 0.17 * len(lines)
+    legend = _ROW * (len(table.places) + 2)
+    # Below each other where the lattice is high enough for it, else side by side.
+    beside = (_SIDE - 0.3) / 2
+    below = min(3.0, (lattice[1] + 0.2 - legend) / 2 - 0.75)
+    maps = max(beside, below)
+    height = head + max(0.3 + lattice[1], legend + 0.8 + maps) + _MARGIN
+    with figure_file(path, width, height) as figure:
+
+        def panel(left: float, top: float, wide: float, high: float) -> "Axes":
+            return figure.add_axes((left / width, 1 - (top + high) / height, wide / width, high / height))
+
+        _head(figure, title, lines)
+        _lattice(panel(_MARGIN + 0.3, head + 0.2, *lattice), table, pictures, tiles)
+        side = _MARGIN + 0.3 + lattice[0] + _GAP
+        _legend(panel(side, head, _SIDE, legend), table)
+        top = head + legend + 0.5
+        _heat(panel(side, top, maps, maps), table, table.hits, "Blues", "Training frames per unit")
+        spot = (side, top + maps + 0.75) if below >= beside else (side + maps + 0.3, top)
+        _heat(panel(*spot, maps, maps), table, table.u_matrix, "Greys", "U-matrix")
+
+
+def _wrapped(text: str, room: float, size: float) -> list[str]:
+    """The text in lines of `room` inches, in a font of `size` points whose letters are half as wide on the average."""
+    return textwrap.wrap(text, int(room * 72 / (0.54 * size)))
+
+
+def _head(figure: "Figure", title: str, lines: Sequence[str]) -> None:
+    width, height = figure.get_size_inches()
+    figure.text(_MARGIN / width, 1 - 0.42 / height, shorten(title, int(width * 8)), fontsize=15)
+    for number, line in enumerate(lines):
+        figure.text(_MARGIN / width, 1 - (0.7 + 0.17 * number) / height, line, fontsize=8.5, color="0.25")
+
+
+def _lattice(axes: "Axes", table: WordTable, pictures: Sequence[Any], tiles: _Tiles) -> None:
+    """The tiles: x and y are inches from the upper left corner."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Rectangle
+
+    size, pad = tiles.size, tiles.width * _FRAME
+    axes.set(xlim=(0, size * tiles.width), ylim=(size * tiles.height, 0))
+    axes.axis("off")
+    colours = np.vstack([place_colours(table.places), _UNLABELLED])
+    rectangles, fills = [], []
+    for unit, (picture, place) in enumerate(zip(pictures, table.place.tolist(), strict=True)):
+        left, top = unit % size * tiles.width, unit // size * tiles.height
+        box = left + pad / 2, top + pad / 2, tiles.width - pad, tiles.height - pad
+        rectangles.append(Rectangle(box[:2], *box[2:]))
+        fills.append(_EMPTY if picture is None else tuple(colours[place]))
+        for start, share, colour in _bar(table.votes[unit], colours):
+            wide = tiles.inner * share
+            low = top + tiles.height - pad - tiles.width * _BAR
+            rectangles.append(Rectangle((left + pad + tiles.inner * start, low), wide, tiles.width * _BAR))
+            fills.append(colour)
+    axes.add_collection(PatchCollection(rectangles, facecolors=fills, linewidths=0, zorder=1))
+    for unit, picture in enumerate(pictures):
+        if picture is not None:
+            left, top = unit % size * tiles.width + pad, unit // size * tiles.height + pad
+            extent = left, left + tiles.inner, top + tiles.inner * tiles.aspect, top
+            axes.imshow(_tile(picture, tiles.aspect), cmap="gray", vmin=0, vmax=255, extent=extent, zorder=2)
+    axes.set(xlim=(0, size * tiles.width), ylim=(size * tiles.height, 0), aspect="auto")
+    _marks(axes, table, tiles, colours)
+
+
+def _bar(votes: NDArray[np.int64], colours: NDArray[np.float64]) -> list[tuple[float, float, tuple[float, ...]]]:
+    """The stretches of a tile's bar: where each starts, how long it is (shares of the bar), and its colour."""
+    if not votes.any():
+        return []
+    shares = votes / votes.sum()
+    starts = np.cumsum(shares) - shares
+    return [(starts[place], shares[place], tuple(colours[place])) for place in np.flatnonzero(votes)]
+
+
+def _tile(picture: NDArray[Any], aspect: float) -> NDArray[np.uint8]:
+    """The picture, as large as it fits into a tile, on paper white."""
+    import cv2
+
+    room = round(_PIXELS * aspect), _PIXELS
+    scale = min(room[0] / picture.shape[0], room[1] / picture.shape[1])
+    high, wide = (max(1, min(full, round(side * scale))) for side, full in zip(picture.shape, room, strict=True))
+    how = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+    tile = np.full(room, 255, np.uint8)
+    top, left = (room[0] - high) // 2, (room[1] - wide) // 2
+    tile[top : top + high, left : left + wide] = np.rint(cv2.resize(picture, (wide, high), interpolation=how))
+    return tile
+
+
+def _marks(axes: "Axes", table: WordTable, tiles: _Tiles, colours: NDArray[np.float64]) -> None:
+    """Numbers on the tiles and at the edges, and crosses; where there is no room for letters, crosses alone."""
+    font = min(8.0, 8.5 * tiles.width)
+    written = tiles.width >= 0.45
+    box: dict[str, Any] = {"boxstyle": "square,pad=0.18", "linewidth": 0}
+    inset = 0.09 * tiles.width
+    for unit, (place, hits) in enumerate(zip(table.place.tolist(), table.hits.tolist(), strict=True)):
+        left, top = unit % tiles.size * tiles.width, unit // tiles.size * tiles.height
+        if not hits:
+            x, y, arm = left + tiles.width / 2, top + tiles.height / 2, 0.12 * tiles.width
+            for turn in (-arm, arm):
+                axes.plot((x - arm, x + arm), (y - turn, y + turn), color="0.55", linewidth=1.2, zorder=3)
+        elif written:
+            paint = {**box, "facecolor": (1, 1, 1, 0.75)}
+            spot = left + tiles.width - inset, top + inset
+            axes.text(*spot, str(hits), ha="right", va="top", size=font, bbox=paint, zorder=4)
+        if place >= 0 and written:
+            paint = {**box, "facecolor": tuple(colours[place])}
+            spot, ink = (left + inset, top + inset), letter_colour(colours[place])
+            axes.text(*spot, str(place + 1), ha="left", va="top", size=font, color=ink, bbox=paint, zorder=4)
+    for number in range(tiles.size) if written else []:
+        middle = (number + 0.5) * tiles.width, (number + 0.5) * tiles.height
+        axes.text(middle[0], -0.06, f"+{number}", ha="center", va="bottom", size=7, color="0.4")
+        axes.text(-0.06, middle[1], table.words[number * tiles.size], ha="right", va="center", size=7, color="0.4")
+
+
+def _legend(axes: "Axes", table: WordTable) -> None:
+    """A line per place: its number and colour, its name, its words and its frames."""
+    from matplotlib.patches import Rectangle
+
+    rows = len(table.places) + 2
+    axes.set(xlim=(0, _SIDE), ylim=(rows, 0))
+    axes.axis("off")
+    for x, text in ((_SIDE - 0.65, "words"), (_SIDE, "frames")):
+        axes.text(x, 0.5, text, size=7.5, ha="right", va="center", color="0.4")
+    unlabelled = int(table.frames.sum() - table.votes.sum())
+    lines = [
+        (str(number + 1), colour, place, int((table.place == number).sum()), int(table.votes[:, number].sum()))
+        for number, (place, colour) in enumerate(zip(table.places, place_colours(table.places), strict=True))
+    ]
+    nowhere = int(((table.place < 0) & (table.frames > 0)).sum())
+    if unlabelled or not lines:
+        lines.append(("", np.array(_UNLABELLED), "(no label)", nowhere, unlabelled))
+    for row, (number, colour, place, words, frames) in enumerate(lines, start=1):
+        axes.add_patch(Rectangle((0, row + 0.08), 0.3, 0.84, facecolor=tuple(colour), linewidth=0))
+        axes.text(0.15, row + 0.53, number, size=7.5, ha="center", va="center", color=letter_colour(colour))
+        axes.text(0.42, row + 0.53, shorten(place, 32), size=8.5, va="center")
+        axes.text(_SIDE - 0.65, row + 0.53, str(words), size=8.5, ha="right", va="center")
+        axes.text(_SIDE, row + 0.53, str(frames), size=8.5, ha="right", va="center")
+
+
+def _heat(axes: "Axes", table: WordTable, values: NDArray[Any], cmap: str, title: str) -> None:
+    """A map of one number per unit, darker for more; its range is told below."""
+    grid = values.reshape(table.size, table.size)
+    axes.imshow(grid, cmap=cmap, interpolation="nearest", aspect="equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[:].set_color("0.7")
+    axes.set_title(title, loc="left", fontsize=8)
+    low, high = (cast(float, f(grid)) for f in (np.min, np.max))
+    axes.set_xlabel(f"{low:.3g} (light) to {high:.3g} (dark)", fontsize=7.5, loc="left", color="0.25")
+    if values.dtype.kind == "i":
+        dead = np.argwhere(grid == 0)
+        axes.plot(dead[:, 1], dead[:, 0], "x", color="0.5", markersize=min(5.0, 60 / table.size), markeredgewidth=0.8)
