@@ -29,7 +29,7 @@ _ROOMS = {
         "read_transitions",
     ),
     "placerec.model": ("Decoding", "Options", "calibrate", "follow_live", "load_recognizer", "train_lm", "update"),
-    "placerec.baselines": ("decode", "load_decoder"),
+    "placerec.methods": ("decode", "load_decoder"),
     "placerec.evaluation": ("evaluate",),
     "placerec.experiments.comparison": ("compare",),
     "placerec.experiments.grid": ("experiment",),
@@ -40,7 +40,6 @@ _ROOMS = {
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 
 if TYPE_CHECKING:
-    from placerec.baselines import decode, load_decoder
     from placerec.errors import PlacerecError
     from placerec.evaluation import evaluate
     from placerec.experiments.comparison import compare
@@ -63,6 +62,7 @@ if TYPE_CHECKING:
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.checks import check_model
     from placerec.lm.inspection import inspect_model
+    from placerec.methods import decode, load_decoder
     from placerec.model import Decoding, Options, calibrate, follow_live, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream

@@ -15,7 +15,7 @@ ROOT = PACKAGE.parent
 HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm", "sklearn")
 # A room imports only from rooms to its left, and these anyone may import.
 LINE = (
-    *("frames", "vision", "words", "lm", "hohmm", "model", "baselines"),
+    *("frames", "vision", "words", "lm", "hohmm", "model", "methods"),
     *("evaluation", "figures", "inspection", "experiments", "demo", "cli"),
 )
 COMMON = {"arrays", "cluster", "errors", "files", "jobs", "journal", "version"}

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from placerec.frames import Reading
     from placerec.model import Decoding
 
-# What stands in placerec.baselines.METHODS, where reading it would load numpy.
+# What stands in placerec.methods.METHODS, where reading it would load numpy.
 METHODS = (
     "majority",
     "naive-bayes",
@@ -89,8 +89,8 @@ def decode(
     and answers each at once. With -w and --live, TOKENS is a camera (camera:0, camera:/dev/video2,
     camera:rtsp://...) or a video; frames that come too fast are dropped, and Ctrl-C ends it.
     """
-    from placerec.baselines import check_method, load_decoder, make_decoder
-    from placerec.baselines import decode as run
+    from placerec.methods import check_method, load_decoder, make_decoder
+    from placerec.methods import decode as run
     from placerec.model import decode_lines, decode_live, format_beliefs
 
     with usage("--method"):

@@ -1,4 +1,4 @@
-"""Lessons for property tests, and what a followed sequence believes."""
+"""Training sets for property tests, and what a followed sequence believes."""
 
 from collections.abc import Sequence
 
@@ -6,22 +6,22 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from placerec.baselines import Follow, Lesson, make_lesson
 from placerec.lm import count_ngrams
+from placerec.methods import MakeStepper, TrainingSet, make_training_set
 from placerec.model import Options, estimate_place
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def lesson_of(
+def training_set_of(
     sentences: Sequence[Sequence[Sequence[int]]],
     words: int,
     *,
     order: int = 2,
     steps: Ints | None = None,
     triples: Ints | None = None,
-) -> Lesson:
+) -> TrainingSet:
     """Places p0, p1... of sentences of word numbers, words w0, w1..., with models of that order."""
     text = {f"p{c}": [[f"w{w}" for w in visit] for visit in visits] for c, visits in enumerate(sentences)}
     vocabulary = [f"w{w}" for w in range(words)]
@@ -29,10 +29,10 @@ def lesson_of(
         place: estimate_place(count_ngrams(visits, order, vocabulary=vocabulary), Options(order))
         for place, visits in text.items()
     }
-    return make_lesson(text, vocabulary, steps=steps, triples=triples, models=models)
+    return make_training_set(text, vocabulary, steps=steps, triples=triples, models=models)
 
 
-def followed(follow: Follow, words: Sequence[int], elapsed: Sequence[int] | None = None) -> Floats:
+def followed(follow: MakeStepper, words: Sequence[int], elapsed: Sequence[int] | None = None) -> Floats:
     """The beliefs (T, C) after each word; 1 frame between words by default."""
     step = follow()
     frames = [min(i, 1) for i in range(len(words))] if elapsed is None else elapsed
@@ -40,7 +40,7 @@ def followed(follow: Follow, words: Sequence[int], elapsed: Sequence[int] | None
 
 
 @st.composite
-def lessons(draw: st.DrawFn, places: int = 4, words: int = 5) -> Lesson:
+def training_sets(draw: st.DrawFn, places: int = 4, words: int = 5) -> TrainingSet:
     """One place or more, some of them empty; steps and triples that need not fit each other."""
     C, V = draw(st.integers(1, places)), draw(st.integers(1, words))
     visit = st.lists(st.integers(0, V - 1), min_size=1, max_size=8)
@@ -49,4 +49,4 @@ def lessons(draw: st.DrawFn, places: int = 4, words: int = 5) -> Lesson:
     triples = rng.integers(0, 4, (C, C, C))
     for c in range(C):
         triples[c, c, :] = triples[:, c, c] = 0
-    return lesson_of(sentences, V, steps=rng.integers(0, 20, (C, C)), triples=triples)
+    return training_set_of(sentences, V, steps=rng.integers(0, 20, (C, C)), triples=triples)

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from helpers.small_world import with_columns, write_images
 
-from placerec.baselines import load_decoder
 from placerec.errors import ModelError, SourceError, StreamError
 from placerec.frames import Frame, find_sequences, read_gray
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.sequence import Gray
 from placerec.hohmm import Belief, Recognizer
+from placerec.methods import load_decoder
 from placerec.model import Decoding, LiveReport, decode, decode_live, follow_live, format_beliefs, train_lm
 from placerec.model.decoding import PAPER
 from placerec.vision import Dictionary

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.baselines import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
-from placerec.baselines.views import PointFollow, Views
 from placerec.experiments.comparison.material import Look, digest
 from placerec.hohmm import Beliefs, Recognizer
 from placerec.lm.union import unite_models
+from placerec.methods import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
+from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
 from placerec.model import Decoder, Decoding, Options, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
 from placerec.version import __version__
@@ -32,11 +32,11 @@ Floats = NDArray[np.float64]
 Step = Callable[[Any], Floats]
 Follow = Callable[[], Step]
 
-POINT_METHODS: dict[str, Callable[[Views, int], PointFollow]] = {
-    "torralba2003": lambda views, seed: torralba2003.fit(views, seed=seed),
-    "ullah2008": lambda views, seed: ullah2008.fit(views, seed=seed),
-    "ullah2008-hmm": lambda views, seed: ullah2008.fit_filtered(views, seed=seed),
-    "knn": lambda views, seed: knn.fit(views),
+POINT_METHODS: dict[str, Callable[[DescriptorTrainingSet, int], MakePointStepper]] = {
+    "torralba2003": lambda training, seed: torralba2003.fit(training, seed=seed),
+    "ullah2008": lambda training, seed: ullah2008.fit(training, seed=seed),
+    "ullah2008-hmm": lambda training, seed: ullah2008.fit_filtered(training, seed=seed),
+    "knn": lambda training, seed: knn.fit(training),
 }
 # In the order of the table.
 ALL = (HOHMM, FIXED, MEMORYLESS, *(name for name in METHODS if name != HOHMM), CASCADE, *POINT_METHODS)
@@ -110,7 +110,7 @@ def run_method(name: str, contest: Contest) -> Run:
     if name == CASCADE:
         return _run_cascade(contest)
     if name in POINT_METHODS:
-        follow: Follow = POINT_METHODS[name](_views(contest), contest.seed)
+        follow: Follow = POINT_METHODS[name](_descriptor_training_set(contest), contest.seed)
         return _timed(follow, contest, [contest.look.points[i].astype(np.float64) for i in contest.tests])
     return _timed(_decoder(name, contest.models), contest, [contest.look.streams[i].words for i in contest.tests])
 
@@ -146,7 +146,7 @@ def _decoder(name: str, models: PlaceModels) -> Follow:
     return follow
 
 
-def _views(contest: Contest) -> Views:
+def _descriptor_training_set(contest: Contest) -> DescriptorTrainingSet:
     """The labelled training frames as points."""
     places = contest.places
     streams = contest.look.streams[: contest.training]
@@ -155,7 +155,7 @@ def _views(contest: Contest) -> Views:
     points = np.concatenate(contest.look.points[: contest.training]).astype(np.float64)
     steps = np.sum([place_steps(stream, places) for stream in streams], axis=0)
     labelled = truth >= 0
-    return Views(points[labelled], truth[labelled], sequences[labelled], places, steps)
+    return DescriptorTrainingSet(points[labelled], truth[labelled], sequences[labelled], places, steps)
 
 
 def _run_cascade(contest: Contest) -> Run:

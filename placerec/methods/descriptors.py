@@ -1,0 +1,79 @@
+"""What the systems on descriptors learn from: labelled training frames as points, with their places and sequences."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.hohmm import Transition
+from placerec.hohmm.filter import filter_step
+from placerec.hohmm.motion import predictor
+from placerec.methods.training_set import normalised
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# A point float64 (k,) in, its belief float64 (C,) out; on-line, so that a belief depends on no later point.
+PointStepFunction = Callable[[Floats], Floats]
+# Begins a sequence.
+MakePointStepper = Callable[[], PointStepFunction]
+MOST_FOLDS = 10
+
+
+@dataclass(frozen=True)
+class DescriptorTrainingSet:
+    """n labelled training frames, in the order of time within a sequence.
+
+    `points` float64 (n, k): descriptors in principal components; `truth` int64 (n,): column in `places` (C);
+    `sequences` int64 (n,): number of the sequence; `steps` int64 (C, C): how often a frame of a place is followed by
+    one of another (`placerec.words.place_steps`).
+    """
+
+    points: Floats = field(repr=False)
+    truth: NDArray[np.int64] = field(repr=False)
+    sequences: NDArray[np.int64] = field(repr=False)
+    places: tuple[str, ...]
+    steps: NDArray[np.int64] = field(repr=False)
+
+
+def held_out_folds(sequences: NDArray[np.int64]) -> Iterator[Mask]:
+    """Which frames to hold out, bool (n,), fold by fold, given the number of each frame's sequence, int64 (n,).
+
+    A fold is one sequence, or each tenth one where there are more than ten.
+
+    Of a single sequence its tenths: the frames beside them are near, so that they flatter what is fitted on the rest.
+    """
+    numbers = np.unique(sequences)
+    if len(numbers) == 1:
+        group = np.arange(len(sequences)) * MOST_FOLDS // len(sequences)
+    else:
+        group = np.searchsorted(numbers, sequences) % MOST_FOLDS
+    for held in np.unique(group):
+        mask: Mask = group == held
+        yield mask
+
+
+def scattered(part: Floats, columns: NDArray[np.int64], places: int) -> Floats:
+    """Log probabilities (n, C) from those of some places' columns; -inf in the others."""
+    spread = np.full((len(part), places), -np.inf)
+    spread[:, columns] = part
+    return spread
+
+
+def filtered(log10_p: Callable[[Floats], Sequence[float]], transition: Transition) -> MakePointStepper:
+    """The project's filter (eq. 1) over points, one transition a frame; `log10_p` of a point in each place."""
+    predict = predictor(transition, 1.0)
+    places = len(transition.matrix)
+
+    def make_stepper() -> PointStepFunction:
+        log_belief: list[float] = []
+
+        def step(point: Floats) -> Floats:
+            nonlocal log_belief
+            predicted = predict(log_belief) if log_belief else [-float(np.log(places))] * places
+            log_belief, _ = filter_step(predicted, log10_p(point))
+            return normalised(np.array(log_belief))
+
+        return step
+
+    return make_stepper
