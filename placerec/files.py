@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
 
 from placerec.errors import OutputError, PlacerecError
 
@@ -161,6 +162,39 @@ def read_lines(path: Path, error: type[PlacerecError]) -> Iterator[str]:
             except UnicodeDecodeError as cause:
                 raise error(_not_utf8(path, number, line[cause.start])) from cause
             yield text.removeprefix("\ufeff").removesuffix("\n") if number == 1 else text.removesuffix("\n")
+
+
+def content_digest(*parts: Any) -> str:
+    """SHA-256 of arrays (their type, shape and values), bytes, and what JSON can hold: 64 hexadecimal digits.
+
+    For keys of what is kept by content: other parts, or other limits between them, give another digest.
+    """
+    # Here and below: not loaded with the package, for the tools in bin/ never need them.
+    import json
+    from hashlib import sha256
+
+    total = sha256()
+    for part in parts:
+        try:
+            view = memoryview(part)
+        except TypeError:
+            kind, data = "json", memoryview(json.dumps(part, sort_keys=True).encode())
+        else:
+            kind, data = f"{view.format} {view.shape}", view if view.c_contiguous else memoryview(view.tobytes())
+        total.update(f"{kind} {data.nbytes}\n".encode())
+        total.update(data)
+    return total.hexdigest()
+
+
+def content_digest_of_file(path: Path, error: type[PlacerecError]) -> str:
+    """SHA-256 of the bytes of a file: 64 hexadecimal digits; `error` names what cannot be read."""
+    from hashlib import file_digest
+
+    try:
+        with path.open("rb") as file:
+            return file_digest(file, "sha256").hexdigest()
+    except OSError as cause:
+        raise error(f"{path}: cannot be read: {cause.strerror}") from cause
 
 
 @contextmanager

@@ -5,13 +5,24 @@ import os
 import signal
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from placerec import files
 from placerec.errors import OutputError, StreamError
-from placerec.files import held_folder, read_text, restore_folder, whole_file, whole_folder, write_text
+from placerec.files import (
+    content_digest,
+    content_digest_of_file,
+    held_folder,
+    read_text,
+    restore_folder,
+    whole_file,
+    whole_folder,
+    write_text,
+)
 
 if sys.platform != "win32":
     import fcntl
@@ -325,3 +336,31 @@ def test_the_umask_is_left_as_it_was() -> None:
     os.umask(before)
     assert files._umask() == before
     assert os.umask(before) == before
+
+
+def test_a_digest_is_of_types_shapes_values_and_limits() -> None:
+    array = np.arange(6, dtype=np.float32)
+    different = [
+        (array,),
+        (array.reshape(2, 3),),
+        (array.reshape(2, 3).T,),
+        (array.view(np.int32),),
+        (array[:3], array[3:]),
+        (b"ab", b"c"),
+        (b"a", b"bc"),
+        ("ab", "c"),
+        (["ab", "c"],),
+        ({"ab": "c"},),
+        (None,),
+        (),
+    ]
+    assert len({content_digest(*parts) for parts in different}) == len(different)
+    assert content_digest(array[::2], {"a": 1, "b": 2}) == content_digest(array[::2].copy(), {"b": 2, "a": 1})
+
+
+def test_a_digest_of_a_file_is_that_of_its_bytes(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(b"abc")
+    assert content_digest_of_file(path, StreamError) == sha256(b"abc").hexdigest()
+    with pytest.raises(StreamError, match=r"b: cannot be read: No such file"):
+        content_digest_of_file(tmp_path / "b", StreamError)

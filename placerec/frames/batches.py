@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from hashlib import blake2b
 from itertools import islice
 from pathlib import Path
 
+from placerec.files import content_digest
 from placerec.frames.sequence import Frame, Gray, Sequence
 
 SIZE = 64  # half a second of work
@@ -64,16 +64,12 @@ def with_images(
         yield replace(batch, images=images)
 
 
-def content_key(sequence: Sequence, batch: Batch) -> bytes:
+def content_key(sequence: Sequence, batch: Batch) -> str:
     """A digest of what the batch's images are read from: names, sizes and times of change of the files."""
-    digest = blake2b(digest_size=16)
-    files = [frame.path for frame in batch.frames]
-    if sequence.recording is not None:
-        digest.update(f"{sequence.recording!r} {batch.first} {len(batch.frames)}".encode())
-        files = sequence.recording.files()
-    for path in files:
-        digest.update(f"{path}\0{_state(path)}\n".encode("utf-8", "surrogateescape"))
-    return digest.digest()
+    recording = sequence.recording
+    files = [frame.path for frame in batch.frames] if recording is None else recording.files()
+    whole = None if recording is None else [repr(recording), batch.first, len(batch.frames)]
+    return content_digest(whole, [(str(path), _state(path)) for path in files])
 
 
 def _state(path: Path) -> tuple[int, int] | None:

@@ -6,7 +6,6 @@ import logging
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from hashlib import blake2b
 from itertools import chain
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError, VisionError
+from placerec.files import content_digest
 from placerec.frames import Frame, read_gray
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.batches import Batch, batches, content_key, with_images
@@ -150,11 +150,14 @@ def _found(
     journal: Journal | None,
 ) -> Iterator[tuple[Batch, Answer]]:
     listed = batches(sequences)
-    whole = blake2b(f"{key} {__version__} {json.dumps(spec.as_dict())}".encode(), digest_size=16).digest()
+
+    def key_of(sequence: FrameSequence, batch: Batch) -> bytes:
+        return bytes.fromhex(content_digest(key, __version__, spec.as_dict(), content_key(sequence, batch)))
+
     ahead: list[tuple[FrameSequence, Batch]] = []
     if journal is not None:
         for sequence, batch in listed:
-            data = journal.next(whole + content_key(sequence, batch))
+            data = journal.next(key_of(sequence, batch))
             if data is None:
                 ahead = [(sequence, batch)]
                 break
@@ -164,7 +167,7 @@ def _found(
 
     def handed_out() -> Iterator[tuple[FrameSequence, Batch]]:
         for sequence, batch in chain(ahead, listed):
-            pending.append((batch, whole + content_key(sequence, batch) if journal is not None else b""))
+            pending.append((batch, key_of(sequence, batch) if journal is not None else b""))
             yield sequence, batch
 
     given = with_images(handed_out(), lambda image: _shrunk(image, spec))
