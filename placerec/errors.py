@@ -79,6 +79,13 @@ def check_optional(module: str, purpose: str, instead: str = "") -> None:
         raise MissingExtraError(package, purpose, ", or ".join(filter(None, (remedy, instead))))
 
 
+def refuse_string(words: object, error: type[PlacerecError]) -> None:
+    """Raise `error` for a string where a list of words belongs: it would be taken letter by letter."""
+    if isinstance(words, str):
+        shown = words if len(words) <= 40 else f"{words[:40]}..."
+        raise error(f"{shown!r} is a string; a list of words, not a string, is needed here: split it")
+
+
 def at(path: "Path | str", line: int, message: str) -> str:
     """`message` with the position in front, as compilers print it."""
     return f"{path}:{line}: {message}"

@@ -30,7 +30,7 @@ _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _DEPTHS = (8, 10, 12, 14, 16)
 
 
-def read_gray(path: Path) -> Gray:
+def read_gray(path: Path | str) -> Gray:
     """The grey levels 0..255 of an image file, (h, w), as `decode_gray` gives them.
 
     Raises SourceError naming the file and the reason: missing, unreadable, a pipe, and what `decode_gray` refuses.

@@ -9,6 +9,7 @@ from typing import Self, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.errors import SourceError
 from placerec.frames.sequence import Frame
 
 Rows = NDArray[np.int64] | NDArray[np.bool_] | Sequence[int] | slice
@@ -131,7 +132,7 @@ class Labels(_Strings):
         return cls()._set((text,), np.zeros(count, np.uint8))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FrameTable:
     """A row for each of n frames, those of one sequence in the order of time.
 
@@ -153,14 +154,15 @@ class FrameTable:
     ) -> "FrameTable":
         """The frames of one sequence from columns; without times and places these are unknown.
 
-        Raises ValueError if the columns are not of one length.
+        Raises SourceError if the columns are not of one length.
         """
         names = Texts(names)
         n = len(names)
         seconds = np.full(n, np.nan) if times is None else np.array(times, np.float64)
         labels = Labels.constant("", n) if places is None else Labels(places)
         if not n == len(seconds) == len(labels):
-            raise ValueError(f"{sequence}: {n} names, {len(seconds)} times and {len(labels)} places of frames")
+            columns = f"{n} names, {len(seconds)} times and {len(labels)} places of frames"
+            raise SourceError(f"{sequence}: {columns}; give one of each a frame")
         return FrameTable(names, Labels.constant(sequence, n), seconds, labels)
 
     @staticmethod
@@ -193,7 +195,7 @@ class FrameTable:
 
     def __repr__(self) -> str:
         places = len({*self.places} - {""})
-        return f"FrameTable({len(self)} frames of {len({*self.sequences})} sequences, {places} places)"
+        return f"FrameTable({len(self)} frames, {len({*self.sequences})} sequences, {places} places)"
 
     @property
     def labelled(self) -> NDArray[np.bool_]:

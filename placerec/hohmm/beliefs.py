@@ -8,8 +8,8 @@ them, stands beside them: they hold given that it is not, and `best` is `unknown
 """
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ UNKNOWN = "unknown"
 _SUM_TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Beliefs:
     """What was believed about every frame of one sequence, n frames, and each of C places.
 
@@ -38,10 +38,10 @@ class Beliefs:
 
     stream: WordStream
     places: tuple[str, ...]
-    selected: Mask = field(repr=False)
-    best: tuple[str, ...] = field(repr=False)
-    belief: Floats = field(repr=False)
-    unknown: Floats | None = field(default=None, repr=False)
+    selected: Mask
+    best: tuple[str, ...]
+    belief: Floats
+    unknown: Floats | None = None
 
     @staticmethod
     def of(
@@ -67,6 +67,9 @@ class Beliefs:
     def __len__(self) -> int:
         return len(self.stream)
 
+    def __repr__(self) -> str:
+        return f"Beliefs({self.name!r}: {len(self)} frames, {list_places(self.places)})"
+
     @property
     def name(self) -> str:
         """The sequence."""
@@ -91,6 +94,12 @@ class Beliefs:
     def words(self) -> tuple[str, ...]:
         """The word of each frame."""
         return self.stream.words
+
+
+def list_places(places: Sequence[str]) -> str:
+    """How many places there are, and the first of them: for the `repr` of what is about places."""
+    names = ", ".join(places)
+    return f"{len(places)} places: {names if len(names) <= 60 else names[:57] + '...'}"
 
 
 def format_header(places: Iterable[str], *, unknown: bool = False) -> str:

@@ -25,7 +25,7 @@ from placerec.vision.work import Answer, Tally, answers, describe_batch
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Descriptors:
     """Descriptors of n frames, in the order of the sequences and of time.
 
@@ -38,6 +38,10 @@ class Descriptors:
     table: FrameTable
     skipped: int = 0
     constant: int = 0
+
+    def __repr__(self) -> str:
+        n, d = self.values.shape
+        return f"Descriptors({n} frames, {d} values of {self.spec.kind}, {len({*self.table.sequences})} sequences)"
 
     @cached_property
     def frames(self) -> tuple[str, ...]:

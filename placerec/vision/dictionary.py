@@ -83,7 +83,7 @@ class Quality:
     dead: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Dictionary:
     """PCA + map: codebook float32 (K, k) and hits int64 (K,), the training frames per unit, row-major on the map.
 
@@ -144,6 +144,11 @@ class Dictionary:
         errors = got.quantisation_error, got.topographic_error, got.entropy, got.dead
         quality = Quality(frames or data.n, data.n, som.epochs, pca.explained, pca.needed, *errors)
         return cls(spec, pca, som.codebook, som.hits, training, quality)
+
+    def __repr__(self) -> str:
+        size, components = self.training.size, len(self.pca.components)
+        of = f"{components} components of {self.spec.kind} descriptors, {len(self.sequences)} sequences"
+        return f"Dictionary({size} x {size} words, {self.dead} of them dead; {of})"
 
     @cached_property
     def vocabulary(self) -> tuple[str, ...]:

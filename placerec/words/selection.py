@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import StreamError
+from placerec.errors import StreamError, refuse_string
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,9 @@ def select(words: Sequence[str], selection: Selection) -> NDArray[np.bool_]:
     """Which of T consecutive words of one sequence are kept, bool (T,).
 
     `subsample`: positions 0, S, 2S... `unique`: the first word of every run of equal words. `compress`: of a run of L
-    equal words the 1st, (M+1)th, (2M+1)th...: ceil(L/M) words (readings A20, `first`).
+    equal words the 1st, (M+1)th, (2M+1)th...: ceil(L/M) words (readings A20, `first`). StreamError for a string.
     """
+    refuse_string(words, StreamError)
     position = np.arange(len(words))
     kept: NDArray[np.bool_]
     if selection.kind == "none":

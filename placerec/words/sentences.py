@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import StreamError
+from placerec.errors import StreamError, refuse_string
 from placerec.files import read_lines
 from placerec.words.selection import Selection, select
 from placerec.words.stream import WordStream, check_word
@@ -99,7 +99,9 @@ def sentences_per_place(streams: Iterable[WordStream], selection: Selection) -> 
 
 
 def format_sentences(sentences: Sequence[Sequence[str]]) -> str:
-    """The text of a sentence file."""
+    """The text of a sentence file; StreamError for a string in place of a sentence or of all of them."""
+    for words in (sentences, *sentences):
+        refuse_string(words, StreamError)
     return "".join(" ".join(words) + "\n" for words in sentences)
 
 

@@ -11,7 +11,7 @@ A text of words without a header (separated by blanks or line ends) is read as a
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.errors import StreamError, at
+from placerec.errors import StreamError, at, refuse_string
 from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
 from placerec.frames.table import FrameTable
@@ -30,7 +30,7 @@ HEADER = "\t".join(COLUMNS) + "\n"
 RESERVED = ("<s>", "</s>", "<unk>", "-pau-")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class WordStream:
     """The words of one sequence: one per frame, in the order of the rows of `table`, which is that of time.
 
@@ -39,8 +39,8 @@ class WordStream:
 
     name: str
     table: FrameTable
-    words: tuple[str, ...] = field(repr=False)
-    distances: NDArray[np.float64] = field(repr=False)
+    words: tuple[str, ...]
+    distances: NDArray[np.float64]
 
     @staticmethod
     def of(
@@ -55,12 +55,15 @@ class WordStream:
         """A stream from columns, as another tokeniser makes it.
 
         `places` are the labels, "" where there is none; `times` are in seconds; `frames` are names, their numbers if
-        left out. ValueError if the columns are not of one length.
+        left out. StreamError for a string in place of words or places, and for columns of different lengths.
         """
+        refuse_string(words, StreamError)
+        refuse_string(places, StreamError)
         table = FrameTable.of(name, map(str, range(len(words))) if frames is None else frames, times, places)
         far = np.full(len(words), np.nan) if distances is None else np.array(distances, np.float64)
         if not len(words) == len(table) == len(far):
-            raise ValueError(f"{name}: {len(words)} words of {len(table)} frames, {len(far)} distances")
+            columns = f"{len(words)} words and {len(far)} distances of {len(table)} frames"
+            raise StreamError(f"{name}: {columns}; give one of each a frame")
         return WordStream(name, table, tuple(words), far)
 
     @staticmethod
@@ -75,6 +78,10 @@ class WordStream:
 
     def __len__(self) -> int:
         return len(self.words)
+
+    def __repr__(self) -> str:
+        labels = len({*self.table.places} - {""})
+        return f"WordStream({self.name!r}: {len(self)} frames, {len({*self.words})} words, {labels} places)"
 
     @cached_property
     def frames(self) -> tuple[str, ...]:
@@ -194,5 +201,6 @@ def read_vocabulary(path: Path | str) -> tuple[str, ...]:
 
 
 def write_vocabulary(words: Iterable[str], path: Path | str) -> None:
-    """Write a vocab.txt: one word a line."""
+    """Write a vocab.txt: one word a line; StreamError for a string in place of words."""
+    refuse_string(words, StreamError)
     write_text(Path(path), "".join(f"{word}\n" for word in words))

@@ -85,6 +85,11 @@ def test_the_path_is_opencvs_gray(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_gray(path), cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
 
 
+def test_a_path_may_be_a_string(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), np.full((8, 9), 7, np.uint8))
+    np.testing.assert_array_equal(read_gray(str(tmp_path / "a.png")), read_gray(tmp_path / "a.png"))
+
+
 def test_suffix_does_not_matter(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_gray(write(tmp_path / "a.jpeg", encode(".png", GRAY))), GRAY)
 

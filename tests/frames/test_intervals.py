@@ -58,6 +58,13 @@ def test_places_against_a_plain_search(cuts: list[int], times: list[int], named:
     assert found == plain
 
 
+def test_an_interval_that_ends_at_the_first_frame_is_counted_from_it() -> None:
+    """It does not hold its end, and so no frame at all otherwise."""
+    one = Intervals(Path("x"), (Interval(0, 10, "hall", 1),))
+    assert one.places([10.0, 15.0, 20.0]) == ["hall", "hall", ""]
+    assert one.places([9.0, 10.0]) == ["hall", ""]
+
+
 def test_seconds_of_a_bag_are_its_stamps_or_those_since_its_start(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from placerec.errors import SourceError
 from placerec.frames.folder import FileFrames, natural_key, read_frames
 from placerec.frames.sequence import Frame
 from placerec.frames.table import FrameTable, Labels, Texts
@@ -82,13 +83,13 @@ def test_rows_of_a_sequence_are_found_in_order(names: list[str]) -> None:
 
 def test_columns_of_different_lengths_are_refused() -> None:
     for columns in ({"times": [1.0]}, {"places": ["hall"]}):
-        with pytest.raises(ValueError, match=r"^run: 2 names, [12] times and [12] places of frames"):
+        with pytest.raises(SourceError, match=r"^run: 2 names, [12] times and [12] places of frames"):
             FrameTable.of("run", ["a", "b"], **columns)
 
 
 def test_a_table_is_told_in_a_line() -> None:
     table = FrameTable.of("run", map(str, range(3)), places=["hall", "", "hall"])
-    assert repr(table) == "FrameTable(3 frames of 1 sequences, 1 places)"
+    assert repr(table) == "FrameTable(3 frames, 1 sequences, 1 places)"
     assert table.labelled.tolist() == [True, False, True]
 
 

@@ -60,6 +60,14 @@ def test_times_are_written_to_the_microsecond_without_exponent(seconds: float, t
     assert format_row("f", seconds, "", "w", True, "a", [1.0]).split("\t")[1] == text
 
 
+def test_beliefs_are_told_in_a_line() -> None:
+    beliefs = parse_beliefs(f"{HEADER}\n{ROW}\n", name="seq1", source="x")
+    assert repr(beliefs) == "Beliefs('seq1': 1 frames, 2 places: kitchen, office)"
+    many = Beliefs.of(WordStream.of("seq1", ["w0"] * 99), tuple(f"place{i}" for i in range(200)), np.eye(99, 200))
+    assert repr(many).startswith("Beliefs('seq1': 99 frames, 200 places: place0, place1, ")
+    assert len(repr(many)) < 120
+
+
 def test_a_very_small_belief_keeps_its_exponent() -> None:
     assert format_row("f", 0.0, "", "w", True, "a", [1.23456789e-30]).endswith("\t1.23456789e-30")
 
@@ -134,6 +142,26 @@ def test_the_column_unknown_is_no_place_and_stands_beside_the_sum() -> None:
     assert beliefs.belief.tolist() == [[0.25, 0.75]]
     assert beliefs.unknown is not None
     assert beliefs.unknown.tolist() == [0.9]
+
+
+@pytest.mark.parametrize(
+    ("belief", "allowed"), [("0.2491", True), ("0.2489", False), ("0.2509", True), ("0.2511", False)]
+)
+def test_beliefs_may_miss_the_sum_of_one_by_a_thousandth(belief: str, allowed: bool) -> None:
+    text = f"{HEADER}\n{ROW.replace('0.25', belief)}\n"
+    if allowed:
+        assert parse_beliefs(text, name="s", source="x").belief.tolist() == [[float(belief), 0.75]]
+    else:
+        with pytest.raises(EvaluationError, match=r"^x:2: the beliefs sum to "):
+            parse_beliefs(text, name="s", source="x")
+
+
+@pytest.mark.parametrize("swapped", [("frame", "time"), ("time", "place"), ("selected", "best")])
+def test_columns_in_another_order_are_refused(swapped: tuple[str, str]) -> None:
+    a, b = swapped
+    header = HEADER.replace(a, "?").replace(b, a).replace("?", b)
+    with pytest.raises(EvaluationError, match=r"^x:1: the header begins .*; the order is 'frame time place word"):
+        parse_beliefs(f"{header}\n{ROW}\n", name="s", source="x")
 
 
 def test_unknown_is_decided_above_a_half_and_where_the_column_is() -> None:

@@ -166,6 +166,14 @@ def test_the_bytes_do_not_depend_on_the_blas_and_its_threads() -> None:
     assert len(outputs.pop().splitlines()) == 2
 
 
+def test_what_is_large_is_told_in_a_line(dictionary: Dictionary) -> None:
+    size, dead = dictionary.training.size, dictionary.dead
+    components = f"{len(dictionary.pca.components)} components of gist descriptors"
+    assert repr(dictionary) == f"Dictionary({size} x {size} words, {dead} of them dead; {components}, 0 sequences)"
+    frames = Descriptors(SPEC, sample(3), FrameTable.of("run", ["a", "b", "c"]))
+    assert repr(frames) == "Descriptors(3 frames, 384 values of gist, 1 sequences)"
+
+
 def test_descriptors_of_another_kind_are_refused(dictionary: Dictionary) -> None:
     rows = sample(3)
     mine = Descriptors(SPEC, rows, FrameTable.of("run", ["a", "b", "c"]))

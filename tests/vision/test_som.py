@@ -206,6 +206,15 @@ def test_near_ties_are_decided_exactly(seed: int, offset: float) -> None:
     np.testing.assert_array_equal(best_units(codes, codebook)[0], brute_force(codes, codebook).argmin(axis=1))
 
 
+@pytest.mark.parametrize("k", [1, 2])
+def test_near_ties_of_few_components_are_decided_exactly(k: int) -> None:
+    """The rounding of a product is bounded from below, however few terms it has."""
+    rng = np.random.default_rng(0)
+    codebook = (1000 + 0.1 * rng.normal(size=(20, k))).astype(np.float32)
+    codes = (1000 + 0.1 * rng.normal(size=(500, k))).astype(np.float32)
+    np.testing.assert_array_equal(best_units(codes, codebook)[0], brute_force(codes, codebook).argmin(axis=1))
+
+
 def test_only_live_units_answer() -> None:
     codes, codebook = sample(500), sample(36, seed=3)
     live = np.arange(36) % 3 == 0

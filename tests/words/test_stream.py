@@ -1,5 +1,6 @@
 """Token streams and vocabularies: round trips, and errors that name the line."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.errors import StreamError
-from placerec.words import WordStream, read_stream, read_vocabulary, write_stream, write_vocabulary
+from placerec.frames.table import FrameTable
+from placerec.words import (
+    Selection,
+    WordStream,
+    format_sentences,
+    read_stream,
+    read_vocabulary,
+    select,
+    write_stream,
+    write_vocabulary,
+)
 from placerec.words.stream import RESERVED
 
 names = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=5).filter(
@@ -67,6 +78,8 @@ def test_plain_text_is_a_stream_of_words(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("frame\ttime\n0\t1\n", ":1: the header 'frame\\ttime' has no column 'word'"),
+        ("frame\n0\n", ":1: the header 'frame' has no column 'word'"),
+        ("place\ttime\nhall\t1\n", ":1: the header 'place\\ttime' has no column 'word'"),
         ("frame\tword\n0\tw1\textra\n", ":2: 3 fields found, 2 expected as in the header"),
         ("time\tword\nnoon\tw1\n", ":2: time 'noon' is not a number"),
         ("time\tword\n1\tw1\n\n2\tw 2\n", ":4: the word 'w 2' is empty or holds white space"),
@@ -98,3 +111,44 @@ def test_vocabulary_round_trip_and_errors(tmp_path: Path) -> None:
         with pytest.raises(StreamError) as error:
             read_vocabulary(path)
         assert str(error.value) == f"{path}{message}"
+
+
+def test_a_string_where_a_list_of_words_belongs_is_refused() -> None:
+    """Letter by letter it would be taken otherwise."""
+    taken: list[Callable[[], object]] = [
+        lambda: select("a b c", Selection()),
+        lambda: WordStream.of("run", "a b c"),
+        lambda: WordStream.of("run", ["a", "b"], "hk"),
+        lambda: format_sentences("a b c"),
+        lambda: format_sentences(["a b c"]),
+        lambda: write_vocabulary("a b c", "vocab.txt"),
+    ]
+    for take in taken:
+        with pytest.raises(StreamError, match=r" is a string; a list of words, not a string, is needed here"):
+            take()
+    with pytest.raises(StreamError, match=r"^'(a ){20}\.\.\.' is a string"):
+        select("a " * 1000, Selection())
+
+
+def test_columns_of_different_lengths_are_refused() -> None:
+    with pytest.raises(StreamError, match=r"^run: 2 words and 1 distances of 2 frames"):
+        WordStream.of("run", ["a", "b"], distances=[1.0])
+    with pytest.raises(StreamError, match=r"^run: 2 words and 2 distances of 3 frames"):
+        WordStream.of("run", ["a", "b"], frames=["0", "1", "2"])
+
+
+def test_a_stream_is_told_in_a_line() -> None:
+    stream = WordStream.of("run", ["a", "b"] * 5000, ["hall", ""] * 5000)
+    assert repr(stream) == "WordStream('run': 10000 frames, 2 words, 1 places)"
+
+
+def test_a_renamed_stream_has_its_name_in_its_table() -> None:
+    stream = WordStream.of("run", ["a"]).renamed("lab-run")
+    assert stream.name == "lab-run"
+    assert stream.table == FrameTable.of("lab-run", ["0"])
+
+
+def test_parts_of_a_stream_are_joined_in_order() -> None:
+    first, second = WordStream.of("run", ["a"], ["hall"], times=[1]), WordStream.of("run", ["b"], [""], times=[2])
+    whole = WordStream.concat([first, second])
+    assert (whole.name, whole.words, whole.places, whole.times.tolist()) == ("run", ("a", "b"), ("hall", ""), [1, 2])
