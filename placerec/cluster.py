@@ -23,7 +23,7 @@ from typing import Any, Generic, TypeVar
 from uuid import uuid4
 
 from placerec.errors import check_optional
-from placerec.jobs import Each, Far, JobError, Listed, Noted, noted
+from placerec.jobs import JobError, LoggedResult, Numbered, RemoteExecutor, ScatteredMap, logged_result
 from placerec.version import __version__
 
 T = TypeVar("T")
@@ -50,7 +50,7 @@ def check_address(address: str) -> None:
 
 
 @contextmanager
-def cluster(address: str) -> Iterator[Far]:
+def cluster(address: str) -> Iterator[RemoteExecutor]:
     """A map whose workers are those of the scheduler at `address`, or N processes of this machine (`local:N`).
 
     Functions and items must be importable and picklable; the function is sent once; what it logs is logged here, in the
@@ -185,12 +185,12 @@ class _Function:
         return self.function.item
 
 
-def _one(function: _Function, item: _Item[Any], level: int) -> Noted[Any]:
-    return noted(function.here(), item.item, level)
+def _one(function: _Function, item: _Item[Any], level: int) -> LoggedResult[Any]:
+    return logged_result(function.here(), item.item, level)
 
 
-def _several(function: _Function, items: _Item[list[Any]], level: int) -> list[Noted[Any]]:
-    return [noted(function.here(), item, level) for item in items.item]
+def _several(function: _Function, items: _Item[list[Any]], level: int) -> list[LoggedResult[Any]]:
+    return [logged_result(function.here(), item, level) for item in items.item]
 
 
 class _Dask:
@@ -202,9 +202,9 @@ class _Dask:
         submit = self._submitter(_one, function)
         tasks = ((lambda lost, item=item: submit(_Item(item))) for item in items)
         for answer in self._results(tasks):
-            yield answer.told()
+            yield answer.replay()
 
-    def keep(self, items: Listed[T], /) -> Each[T]:
+    def keep(self, items: Numbered[T], /) -> ScatteredMap[T]:
         """Maps functions over items that lie with the workers; `items` gives them again when a worker is lost."""
         size = max(1, min(KEPT, len(items) // (4 * max(1, self._threads()))))
         groups = [range(first, min(first + size, len(items))) for first in range(0, len(items), size)]
@@ -221,7 +221,7 @@ class _Dask:
             submit = self._submitter(_several, function)
             tasks = ((lambda lost, group=group: submit(place(group, lost))) for group in range(len(groups)))
             for answer in chain.from_iterable(self._results(tasks)):
-                yield answer.told()
+                yield answer.replay()
 
         return each
 

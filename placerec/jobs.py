@@ -8,7 +8,8 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent import futures
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +21,7 @@ from placerec.errors import PlacerecError
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 R = TypeVar("R")
-Progress = Callable[[int, int], None]
+Progress = Callable[[int, int], None]  # items done, items in all
 log = logging.getLogger("placerec")
 
 # For fewer items than this, starting processes takes longer than they save.
@@ -33,13 +34,13 @@ class JobError(PlacerecError):
     """A process of the work came to its end before the work did."""
 
 
-class Map(Protocol):
+class Executor(Protocol):
     """Like the built-in `map` of one iterable: lazy, the results in the order of the items."""
 
     def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]: ...
 
 
-class Listed(Protocol[T_co]):
+class Numbered(Protocol[T_co]):
     """Items by number: a sequence, as far as a cluster needs it."""
 
     def __len__(self) -> int: ...
@@ -47,30 +48,30 @@ class Listed(Protocol[T_co]):
     def __getitem__(self, at: int, /) -> T_co: ...
 
 
-class Each(Protocol[T_co]):
+class ScatteredMap(Protocol[T_co]):
     """A map of one function after the other over the same items."""
 
     def __call__(self, function: Callable[[T_co], R], /) -> Iterator[R]: ...
 
 
 @runtime_checkable
-class Far(Map, Protocol):
-    """A map of workers on other machines (`cluster.cluster`), which can keep items for several functions."""
+class RemoteExecutor(Executor, Protocol):
+    """An executor of other machines (`cluster.cluster`), which can keep items for several functions."""
 
-    def keep(self, items: Listed[T], /) -> Each[T]: ...
+    def keep(self, items: Numbered[T], /) -> ScatteredMap[T]: ...
 
 
-def far(work: Map | None) -> Map:
+def remote_or_local_map(work: Executor | None) -> Executor:
     """`work` if it is of other machines, else the built-in map.
 
     For arithmetic on large arrays, which the processors of this machine share already.
     """
-    return work if isinstance(work, Far) else map
+    return work if isinstance(work, RemoteExecutor) else map
 
 
-def each_of(items: Listed[T], work: Map | None) -> Each[T]:
-    """Maps functions over the items as `far` would; other machines are sent each item once, if there are two."""
-    if isinstance(work, Far) and len(items) > 1:
+def scatter(items: Numbered[T], work: Executor | None) -> ScatteredMap[T]:
+    """Maps functions over the items, which other machines are sent once, if there are two; else the built-in map."""
+    if isinstance(work, RemoteExecutor) and len(items) > 1:
         return work.keep(items)
     return lambda function: map(function, map(items.__getitem__, range(len(items))))
 
@@ -80,7 +81,7 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def workers(jobs: int | None = None) -> Map:
+def workers(jobs: int | None = None) -> Executor:
     """What maps a function in `jobs` processes (MOST at most); 1: in this one; None: in its threads, one a processor.
 
     Functions and items of processes must be importable and picklable; the function goes to each process once, and what
@@ -121,12 +122,12 @@ def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few
     with _Workers(jobs, function) as pool:
         try:
             for answer in _ahead(pool, partial(_submit, pool, call), chain(first, rest), 4 * jobs):
-                yield answer.told()
+                yield answer.replay()
         except BrokenProcessPool as error:
             raise JobError("a process of the work was killed; give it more memory, or fewer jobs") from error
 
 
-def _ahead(pool: Executor, submit: Callable[[T], Future[R]], items: Iterable[T], window: int) -> Iterator[R]:
+def _ahead(pool: futures.Executor, submit: Callable[[T], Future[R]], items: Iterable[T], window: int) -> Iterator[R]:
     waiting: deque[Future[R]] = deque()
     try:
         for item in items:
@@ -147,7 +148,7 @@ class _Workers(ProcessPoolExecutor):
         super().__init__(jobs, mp_context=spawn, initializer=_begin, initargs=(function,))
 
 
-def _submit(pool: Executor, call: Callable[[T], R], item: T) -> "Future[R]":
+def _submit(pool: futures.Executor, call: Callable[[T], R], item: T) -> "Future[R]":
     """Hand out an item; a process that this starts meets Ctrl-C only once `_begin` has told it how to end."""
     if not hasattr(signal, "pthread_sigmask"):
         return pool.submit(call, item)
@@ -178,7 +179,7 @@ def _end_after(wait: Callable[[], None]) -> None:
     os.kill(os.getpid(), signal.SIGTERM)
 
 
-class _Notes(logging.Handler):
+class _LogCollector(logging.Handler):
     """Keeps what this thread logs, ready to be sent to another process."""
 
     def __init__(self) -> None:
@@ -193,30 +194,30 @@ class _Notes(logging.Handler):
 
 
 @dataclass(frozen=True)
-class Noted(Generic[R]):
+class LoggedResult(Generic[R]):
     """A result from another process, and what was logged there."""
 
     result: R
     records: list[logging.LogRecord]
 
-    def told(self) -> R:
+    def replay(self) -> R:
         """The result, once what was logged there is logged here."""
         for record in self.records:
             log.handle(record)
         return self.result
 
 
-def noted(function: Callable[[T], R], item: T, level: int) -> Noted[R]:
+def logged_result(function: Callable[[T], R], item: T, level: int) -> LoggedResult[R]:
     """In another process: `function` of the item, and what it logs at `level` and above."""
-    notes = _Notes()
+    notes = _LogCollector()
     log.setLevel(level)
     log.propagate = False
     log.addHandler(notes)
     try:
-        return Noted(function(item), notes.records)
+        return LoggedResult(function(item), notes.records)
     finally:
         log.removeHandler(notes)
 
 
-def _call(level: int, item: Any) -> Noted[Any]:
-    return noted(_function, item, level)
+def _call(level: int, item: Any) -> LoggedResult[Any]:
+    return logged_result(_function, item, level)

@@ -22,7 +22,7 @@ from placerec import cluster as room
 from placerec.cli import commands
 from placerec.cluster import check_address, cluster
 from placerec.errors import MissingExtraError, StreamError
-from placerec.jobs import Each, Far, JobError, Listed, each_of
+from placerec.jobs import JobError, Numbered, RemoteExecutor, ScatteredMap, scatter
 from placerec.model import Options, train_lm
 from placerec.vision import DescriptorSpec, Dictionary, describe_sources, train_dictionary
 from placerec.words.tokenize import tokenize
@@ -44,13 +44,13 @@ def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalDask]:
 class Dying:
     """A cluster that loses a worker when `after` results have come, counted over all maps."""
 
-    def __init__(self, work: Far, machines: LocalDask, after: int) -> None:
+    def __init__(self, work: RemoteExecutor, machines: LocalDask, after: int) -> None:
         self._work, self._machines, self._left = work, machines, after
 
     def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
         return self._counted(self._work(function, items))
 
-    def keep(self, items: Listed[T], /) -> Each[T]:
+    def keep(self, items: Numbered[T], /) -> ScatteredMap[T]:
         each = self._work.keep(items)
         return lambda function: self._counted(each(function))
 
@@ -157,7 +157,7 @@ def test_a_lost_worker_costs_only_its_share(machines: LocalDask, tmp_path: Path)
 def test_what_is_kept_is_sent_again_when_its_worker_is_lost(machines: LocalDask) -> None:
     items = [np.full((3, 2), number, np.float32) for number in range(20)]
     with dying(machines, after=30) as work:
-        each = each_of(items, work)
+        each = scatter(items, work)
         for _ in range(4):
             assert list(each(total)) == [6.0 * number for number in range(20)]
 

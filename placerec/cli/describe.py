@@ -16,7 +16,7 @@ from placerec.cli.options import (
 
 if TYPE_CHECKING:
     from placerec.frames import Reading
-    from placerec.jobs import Map
+    from placerec.jobs import Executor
     from placerec.vision import DescriptorSpec
 
 
@@ -32,7 +32,7 @@ def describe(
     spec: "DescriptorSpec | None",
     matrix: Path | None,
     out: Path,
-    work: "Map",
+    work: "Executor",
 ) -> None:
     """Write the descriptor of every frame.
 

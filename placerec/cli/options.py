@@ -17,7 +17,7 @@ from click.core import ParameterSource
 from placerec.errors import PlacerecError
 
 if TYPE_CHECKING:
-    from placerec.jobs import Map
+    from placerec.jobs import Executor
 
 Command = Callable[..., Any]
 log = logging.getLogger("placerec")
@@ -152,7 +152,7 @@ _CLUSTER = click.option(
 
 
 @contextmanager
-def _cluster(address: str | None) -> Iterator["Map | None"]:
+def _cluster(address: str | None) -> Iterator["Executor | None"]:
     if address is None:
         yield None
         return

@@ -17,7 +17,7 @@ from placerec.cli.options import (
 
 if TYPE_CHECKING:
     from placerec.frames import Reading
-    from placerec.jobs import Map
+    from placerec.jobs import Executor
 
 
 @click.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")
@@ -33,7 +33,7 @@ def tokenize(
     words: Path,
     descriptor: tuple[str, Path] | None,
     out: Path,
-    work: "Map",
+    work: "Executor",
 ) -> None:
     """Write the visual word of every frame.
 

@@ -8,7 +8,7 @@ import click
 from placerec.cli.options import PATH, FiniteRange, cluster_option, output_option, progress_bar, talk_options, usage
 
 if TYPE_CHECKING:
-    from placerec.jobs import Map
+    from placerec.jobs import Executor
 
 # The names of placerec.lm.SMOOTHINGS, written out: importing it would make --help wait for numpy.
 SMOOTHING_NAMES = tuple(
@@ -73,7 +73,7 @@ def train_lm(
     markers: bool,
     vocab: Path | None,
     out: Path,
-    work: "Map | None",
+    work: "Executor | None",
 ) -> None:
     """Train one n-gram model per place, as ARPA files.
 

@@ -18,7 +18,7 @@ from placerec.cli.options import (
 
 if TYPE_CHECKING:
     from placerec.frames import Reading
-    from placerec.jobs import Map
+    from placerec.jobs import Executor
     from placerec.vision import DescriptorSpec
 
 
@@ -95,7 +95,7 @@ def train_words(
     spec: "DescriptorSpec | None",
     matrix: Path | None,
     out: Path,
-    work: "Map",
+    work: "Executor",
 ) -> None:
     """Learn visual words: PCA and a map of descriptors.
 

@@ -1,6 +1,6 @@
 """The commands that look at words: sources in, tables and pictures out."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +13,9 @@ from placerec.inspection.frame_sheet import draw_frame_sheet
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.word_stability import plot_stability
 from placerec.inspection.words import WordTable, typical_images, word_table
+from placerec.jobs import Progress
 from placerec.vision import Dictionary, describe
 from placerec.vision.stability import Stability, word_changes
-
-Progress = Callable[[int, int], None]
 
 
 def show_words(

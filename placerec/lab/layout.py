@@ -1,6 +1,6 @@
 """Writes the laboratory as COLD lays out its sequences (Saarbruecken's style of names)."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from placerec.errors import OutputError
 from placerec.files import whole_folder
+from placerec.jobs import Progress
 from placerec.lab.camera import camera, develop, look, mean_radiance
 from placerec.lab.light import ILLUMINATIONS, Illumination, illumination
 from placerec.lab.path import Timing, Track, drive
 from placerec.lab.scene import Paint, light_up, paint, panels_of_run
 from placerec.lab.world import Panel, outline, place
-
-Progress = Callable[[int, int], None]
 
 OWNED = ("seq[34]_*", "README.txt")
 SEQUENCES = tuple(

@@ -11,7 +11,7 @@ import numpy as np
 from placerec.arrays import Ints
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text
-from placerec.jobs import Map
+from placerec.jobs import Executor
 from placerec.lm.counts import NgramCounts, add_counts, count_text, numbered, tabulate
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.stored_text import Numbers, StoredText
@@ -29,7 +29,7 @@ def count_texts(
     *,
     vocabulary: Iterable[str],
     markers: bool = True,
-    work: Map = map,
+    work: Executor = map,
 ) -> Iterator[NgramCounts]:
     """`count_ngrams` of every text, in order, with a closed vocabulary; `work` counts the pieces, which are added here.
 

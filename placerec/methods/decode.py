@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from placerec.errors import ModelError
 from placerec.frames import Reading
 from placerec.hohmm import Beliefs
+from placerec.jobs import Progress
 from placerec.methods.follower import Follower
 from placerec.methods.methods import HOHMM, METHODS, NEED_DESCRIPTORS
 from placerec.methods.training_set import read_training_set
 from placerec.model import Decoder, Decoding, PlaceModels, load_model, make_recognizer
 from placerec.model import decode as decode_with
-from placerec.model.decode import Progress
 from placerec.model.decoding import PAPER
 from placerec.model.recognize import check_words
 

@@ -12,6 +12,7 @@ from placerec.frames import Reading
 from placerec.hohmm import Beliefs, Recognizer, belief_rows, format_header, format_row
 from placerec.hohmm.beliefs import UNKNOWN
 from placerec.hohmm.explain import EXPLAINED, explain_stream
+from placerec.jobs import Progress
 from placerec.model.corpus import STREAM_SUFFIXES
 from placerec.model.decoder import Decoder
 from placerec.model.decoding import PAPER, Decoding
@@ -21,7 +22,6 @@ from placerec.words import WordStream
 
 OWNED = ("*.tsv", "*.jsonl")
 log = logging.getLogger(__name__)
-Progress = Callable[[int, int], None]
 
 
 def decode(

@@ -10,7 +10,7 @@ MODEL/nonevents.txt          without markers: what the `ngram-count` commands ne
 
 import json
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from placerec.errors import LanguageModelError, ModelError
 from placerec.files import whole_folder, write_text
 from placerec.frames.places import check_place, check_twins
-from placerec.jobs import Map
+from placerec.jobs import Executor, Progress
 from placerec.lm import (
     BackoffModel,
     NgramCounts,
@@ -43,7 +43,6 @@ OWNED = ("*.arpa", MODEL_JSON, VOCABULARY, "nonevents.txt", "sentences", "counts
 MAX_ORDER = 9
 NO_PLACE = "no labelled frame found: label the frames (places.lst, or one folder per place) to train"
 log = logging.getLogger(__name__)
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def train_lm(
     *,
     options: Options = Options(),
     vocabulary: Path | str | None = None,
-    work: Map | None = None,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
     """`placerec train-lm`: read token streams or sentences (see `gather_corpus`) and write a MODEL/ folder.
@@ -131,7 +130,7 @@ def train_model(
     *,
     options: Options = Options(),
     record: Record = NO_RECORD,
-    work: Map | None = None,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Train one language model per place and write the MODEL/ folder `out`, whole or not at all.
@@ -153,7 +152,7 @@ def _write_model(
     vocabulary: Sequence[str],
     options: Options,
     record: Record,
-    work: Map | None,
+    work: Executor | None,
     progress: Progress | None,
 ) -> None:
     """What MODEL/ holds beside the files of sentences, which are there."""
@@ -167,7 +166,7 @@ def _write_model(
 
 
 def _counted(
-    texts: Iterable[Iterable[Sequence[str]]], vocabulary: Sequence[str], options: Options, work: Map | None
+    texts: Iterable[Iterable[Sequence[str]]], vocabulary: Sequence[str], options: Options, work: Executor | None
 ) -> Iterator[NgramCounts]:
     order, markers = options.order, options.markers
     if work is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError
-from placerec.jobs import Each, Map, each_of
+from placerec.jobs import Executor, ScatteredMap, scatter
 from placerec.vision.exact import TERMS
 
 Rows = NDArray[np.float32]
@@ -46,13 +46,13 @@ class Stored:
     `each` maps functions over them; workers on other machines have copies of their own.
     """
 
-    def __init__(self, file: IO[bytes], source: Source, work: Map | None) -> None:
+    def __init__(self, file: IO[bytes], source: Source, work: Executor | None) -> None:
         self._file = file
         self._count, self._width = 0, 0
         for rows in chunks(source):
             file.write(rows.astype(np.float32, copy=False).tobytes())
             self._count, self._width = self._count + 1, rows.shape[1]
-        self.each: Each[Rows] = each_of(self, work)
+        self.each: ScatteredMap[Rows] = scatter(self, work)
 
     def __len__(self) -> int:
         return self._count
@@ -67,13 +67,13 @@ class Stored:
 
 
 @contextmanager
-def stored(source: Source, work: Map | None = None) -> Iterator[Stored]:
+def stored(source: Source, work: Executor | None = None) -> Iterator[Stored]:
     """The rows of a source for many passes: in memory up to IN_MEMORY, beyond in a nameless file."""
     with tempfile.SpooledTemporaryFile(IN_MEMORY) as file:
         yield Stored(file, source, work)
 
 
-def each_chunk(source: Source) -> Each[Rows]:
+def each_chunk(source: Source) -> ScatteredMap[Rows]:
     """Maps functions over the chunks of a source: one function for every pass."""
     return source.each if isinstance(source, Stored) else lambda function: map(function, chunks(source))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from placerec.errors import VisionError
 from placerec.frames import Sequence
 from placerec.frames.table import FrameTable, Rows
-from placerec.jobs import Map, Progress
+from placerec.jobs import Executor, Progress
 from placerec.journal import Journal
 from placerec.vision.external import read_rows
 from placerec.vision.gist import Floats
@@ -84,7 +84,7 @@ def describe(
     spec: DescriptorSpec | None = None,
     *,
     matrix: Path | str | None = None,
-    work: Map | None = None,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> Descriptors:
     """The descriptor of every frame; an image that cannot be read is skipped, counted and named in a warning.
@@ -107,7 +107,7 @@ def described(
     spec: DescriptorSpec,
     tally: Tally,
     *,
-    work: Map | None = None,
+    work: Executor | None = None,
     journal: Journal | None = None,
     progress: Progress | None = None,
 ) -> Iterator[tuple[FrameTable, Floats]]:
@@ -140,7 +140,7 @@ def keep_described(
     sequences: list[Sequence],
     spec: DescriptorSpec,
     journal: Journal,
-    work: Map | None = None,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> KeptDescriptors:
     """Describe the frames as `describe` does; the descriptors are left in the journal."""

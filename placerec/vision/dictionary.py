@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.frames.sequence import Gray
-from placerec.jobs import Map
+from placerec.jobs import Executor
 from placerec.version import __version__
 from placerec.vision.chunks import CHUNK, Rows, Source, chunks, stored
 from placerec.vision.describe import Descriptors
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
 from placerec.vision.quality import MapQuality, map_quality
-from placerec.vision.som import RULES, WIDTH, Progress, Units, nearest_units, train_som
+from placerec.vision.som import RULES, WIDTH, EpochProgress, Units, nearest_units, train_som
 from placerec.vision.spec import DescriptorSpec, descriptor
 from placerec.vision.storage import Arrays, fingerprint, read_npz, write_npz
 
@@ -112,8 +112,8 @@ class Dictionary:
         units: str = "live",
         rule: str = "batch",
         width: float = WIDTH,
-        progress: Progress | None = None,
-        work: Map | None = None,
+        progress: EpochProgress | None = None,
+        work: Executor | None = None,
     ) -> "Dictionary":
         """Learn size x size words from descriptors (n, spec.length) in time order (readings A25-A29).
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError
-from placerec.jobs import Map, far
+from placerec.jobs import Executor, remote_or_local_map
 from placerec.vision import exact
 from placerec.vision.chunks import CHUNK, Source, Stream, chunks
 
@@ -64,13 +64,13 @@ class Pca:
         return self.components.T.astype(np.float64)
 
 
-def moments(source: Source, work: Map | None = None) -> Moments:
+def moments(source: Source, work: Executor | None = None) -> Moments:
     """The moments of (n, d) float32 in one pass, from memory, a memory map or a stream; the same however it is cut.
 
     `work`: other machines, if there are any, take the chunks.
     """
     total = None
-    for part in far(work)(Moments.of, chunks(source)):
+    for part in remote_or_local_map(work)(Moments.of, chunks(source)):
         total = (total or Moments.none(len(part.mean))).plus(part)
     return total or Moments.none(0)
 

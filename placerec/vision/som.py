@@ -11,7 +11,7 @@ from scipy.sparse import csc_array
 
 from placerec.vision.chunks import CHUNK, Rows, Source, check_again, chunks, each_chunk
 
-Progress = Callable[[int, int, float], None]  # epoch (from 1), epochs, quantisation error
+EpochProgress = Callable[[int, int, float], None]  # epoch (from 1), epochs, quantisation error
 
 RULES = ("batch", "online")
 EPOCHS = 50
@@ -61,7 +61,7 @@ def train_som(
     rule: str = "batch",
     width: float = WIDTH,
     epochs: int | None = None,
-    progress: Progress | None = None,
+    progress: EpochProgress | None = None,
 ) -> Som:
     """Train size x size units on PCA coordinates (n, k), largest variance first, from memory or streamed.
 
@@ -119,7 +119,7 @@ def _batch(
     rng: np.random.Generator,
     width: float,
     epochs: int,
-    progress: Progress | None,
+    progress: EpochProgress | None,
 ) -> tuple[Rows, int]:
     """The codebook after at most `epochs` passes, and the number of passes that moved it."""
     cooling = (epochs + 1) // 2
@@ -154,7 +154,7 @@ def _online(
     rng: np.random.Generator,
     width: float,
     epochs: int,
-    progress: Progress | None,
+    progress: EpochProgress | None,
 ) -> tuple[Rows, int]:
     """Kohonen's rule; the quantisation error that `progress` is told is that of the frames as they were met."""
     rows = np.concatenate(list(chunks(source)))

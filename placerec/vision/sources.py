@@ -9,7 +9,7 @@ from pathlib import Path
 from placerec.errors import OutputError
 from placerec.files import whole_file
 from placerec.frames import Reading, Sequence, files_of, find_sequences
-from placerec.jobs import Map, Progress
+from placerec.jobs import Executor, Progress
 from placerec.journal import open_journal
 from placerec.vision.chunks import Source
 from placerec.vision.describe import describe, keep_described, save_descriptors
@@ -28,7 +28,7 @@ def describe_sources(
     spec: DescriptorSpec | None = None,
     matrix: Path | str | None = None,
     reading: Reading = Reading(),
-    work: Map | None = None,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Write the descriptors of all frames of the sources to `out`; `progress` is called with frames done and in all.
@@ -64,7 +64,7 @@ def train_dictionary(
     rule: str = "batch",
     width: float = WIDTH,
     held_out: Iterable[Path | str] = (),
-    work: Map | None = None,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> Dictionary:
     """Describe the frames of the sources, fit a dictionary to them (`Dictionary.fit`) and write it to `out`.

@@ -18,7 +18,7 @@ from placerec.frames import Frame, read_gray
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.batches import Batch, batches, content_key, with_images
 from placerec.frames.sequence import Gray
-from placerec.jobs import Far, Map, Progress, workers
+from placerec.jobs import Executor, Progress, RemoteExecutor, workers
 from placerec.journal import Journal
 from placerec.version import __version__
 from placerec.vision.images import check_gray, fit_image
@@ -112,7 +112,7 @@ def answers(
     tally: Tally,
     *,
     key: str,
-    work: Map | None = None,
+    work: Executor | None = None,
     journal: Journal | None = None,
     progress: Progress | None = None,
 ) -> Iterator[tuple[Batch, Answer]]:
@@ -146,7 +146,7 @@ def _found(
     sequences: Sequence[FrameSequence],
     spec: DescriptorSpec,
     key: str,
-    work: Map,
+    work: Executor,
     journal: Journal | None,
 ) -> Iterator[tuple[Batch, Answer]]:
     listed = batches(sequences)
@@ -171,7 +171,7 @@ def _found(
             yield sequence, batch
 
     given = with_images(handed_out(), lambda image: _shrunk(image, spec))
-    for answer in work(function, map(_absolute, given) if isinstance(work, Far) else given):
+    for answer in work(function, map(_absolute, given) if isinstance(work, RemoteExecutor) else given):
         batch, its = pending.popleft()
         if journal is not None:
             journal.add(its, answer.pack())

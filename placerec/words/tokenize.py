@@ -11,7 +11,7 @@ from placerec.frames import Reading, find_sequences
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.batches import Batch
 from placerec.frames.table import FrameTable
-from placerec.jobs import Map, Progress
+from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal
 from placerec.version import __version__
 from placerec.vision import Descriptors, Dictionary, describe
@@ -30,7 +30,7 @@ def tokenize(
     *,
     matrix: Path | str | None = None,
     reading: Reading = Reading(),
-    work: Map | None = None,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
     """`placerec tokenize`: write the tokens folder `out` (one .tsv per sequence, vocab.txt) of image sources.
@@ -54,7 +54,7 @@ def streams_of(
     *,
     matrix: Path | str | None = None,
     reading: Reading = Reading(),
-    work: Map | None = None,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> list[WordStream]:
     """The token streams of image sources: each frame's best-matching unit in `dictionary`.
@@ -96,7 +96,7 @@ def _parts(
     dictionary: Dictionary,
     matrix: Path | str | None,
     reading: Reading,
-    work: Map | None,
+    work: Executor | None,
     journal: Journal | None,
     progress: Progress | None,
 ) -> Iterator[WordStream]:
@@ -117,7 +117,7 @@ def _parts(
 def _tokenized(
     sequences: Sequence[FrameSequence],
     dictionary: Dictionary,
-    work: Map | None,
+    work: Executor | None,
     journal: Journal | None,
     progress: Progress | None,
 ) -> Iterator[WordStream]:

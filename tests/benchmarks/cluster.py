@@ -30,7 +30,7 @@ from helpers.local_dask import LocalDask, local_dask
 
 from placerec.cluster import cluster
 from placerec.frames import find_sequences
-from placerec.jobs import Far
+from placerec.jobs import RemoteExecutor
 from placerec.model import train_lm
 from placerec.vision import DescriptorSpec, Dictionary, describe_sources
 from placerec.vision.chunks import stored
@@ -40,7 +40,7 @@ from placerec.words import WordStream, write_stream, write_vocabulary
 from placerec.words.tokenize import tokenize
 
 SIDE, EPOCHS = 20, 10
-Job = Callable[[Far | None], object]
+Job = Callable[[RemoteExecutor | None], object]
 
 
 @dataclass
@@ -98,7 +98,7 @@ class Meter:
         self._process.communicate()
 
 
-def measured(job: Job, work: Far, meter: Meter) -> Run:
+def measured(job: Job, work: RemoteExecutor, meter: Meter) -> Run:
     """A run of the job, without the way to the cluster and back."""
     before, start, processor = meter.passed(), time.perf_counter(), time.process_time()
     job(work)
@@ -166,7 +166,7 @@ def jobs(sources: list[Path], rows: int, folder: Path) -> list[tuple[str, int, J
         write_stream(WordStream.of(place, named, [place] * len(named)), folder / f"tokens/{place}.tsv")
     write_vocabulary(words.vocabulary, folder / "tokens/vocab.txt")
 
-    def epochs(work: Far | None) -> None:
+    def epochs(work: RemoteExecutor | None) -> None:
         with stored(codes, work) as kept:
             train_som(kept, SIDE, rng=np.random.default_rng(0), epochs=EPOCHS)
 

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from placerec.jobs import Map, workers
+from placerec.jobs import Executor, workers
 from placerec.vision import gist
 
 IMAGES = {64: 120, 128: 60, 256: 16}  # per turn, and per batch
@@ -71,7 +71,7 @@ def describe_all(variant: str, images: list[Image]) -> int:
     return len([gist(image, variant) for image in images])
 
 
-def flow(work: Map, variant: str, images: list[Image]) -> float:
+def flow(work: Executor, variant: str, images: list[Image]) -> float:
     """Images a second, from the first batch's answer to the last's."""
     answers = work(partial(describe_all, variant), [images] * BATCHES)
     next(answers)

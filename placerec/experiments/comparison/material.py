@@ -5,7 +5,7 @@ What takes time is kept in a cache folder, in files that are named by a digest o
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -19,6 +19,7 @@ from placerec.frames import Sequence as FrameSequence
 from placerec.frames import files_of, images_at
 from placerec.frames.sequence import Gray
 from placerec.frames.table import FrameTable
+from placerec.jobs import Progress
 from placerec.version import __version__
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe, descriptor, save_descriptors
 from placerec.vision.external import read_rows
@@ -31,7 +32,6 @@ GIST, CENTRIST = DescriptorSpec(), DescriptorSpec(kind="centrist")
 BATCH = 2000
 # Images that the cost of the front end is measured on.
 TIMED = 30
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from placerec.frames.recordings import is_recording
 from placerec.frames.table import FrameTable
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import typical_images, word_table
-from placerec.jobs import Map, Progress
+from placerec.jobs import Executor, Progress
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe
 from placerec.vision.storage import read_npz, write_npz
 from placerec.words.tokenize import tokens_of, write_tokens
@@ -61,7 +61,7 @@ def find_images(globs: Sequence[str], folder: Path) -> list[FrameSequence]:
 
 
 def describe_all(
-    sequences: Sequence[FrameSequence], folder: Path, *, work: Map | None = None, progress: Progress | None = None
+    sequences: Sequence[FrameSequence], folder: Path, *, work: Executor | None = None, progress: Progress | None = None
 ) -> list[Described]:
     """Describe every frame, or know it again; one file per sequence in `folder`, which may be used again at once."""
     described = []
@@ -91,7 +91,7 @@ def _usable(one: Described) -> bool:
     return True
 
 
-def _describe(one: Described, work: Map | None, progress: Progress | None) -> None:
+def _describe(one: Described, work: Executor | None, progress: Progress | None) -> None:
     # Equal names in one folder cannot be.
     row = {frame.name: number for number, frame in enumerate(one.sequence.frames)}
     found = describe([one.sequence], SPEC, work=work, progress=progress)
