@@ -9,7 +9,6 @@ import platform
 import re
 import signal
 import warnings
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
@@ -22,6 +21,7 @@ from time import monotonic
 from typing import Any, Generic, TypeVar
 from uuid import uuid4
 
+from placerec.ahead import look_ahead
 from placerec.errors import check_optional
 from placerec.jobs import JobError, LoggedResult, Numbered, RemoteExecutor, ScatteredMap, logged_result
 from placerec.version import __version__
@@ -235,22 +235,19 @@ class _Dask:
 
     def _results(self, tasks: Iterable[Task]) -> Iterator[Any]:
         """The results of the tasks in order; only some of them are submitted before the first is there."""
-        window = 2 * self._threads() + 4
-        waiting: deque[tuple[Task, Any]] = deque()
-        try:
-            for task in tasks:
-                waiting.append((task, task(False)))
-                if len(waiting) > window:
-                    yield self._result(*waiting.popleft())
-            while waiting:
-                yield self._result(*waiting.popleft())
-        finally:
-            if waiting and self._client.status == "running":
-                with suppress(OSError):
-                    self._client.cancel([future for _, future in waiting], force=True)
+        ahead = 2 * self._threads() + 4
+        return look_ahead(lambda task: (task, task(False)), self._result, tasks, ahead, at_end=self._cancel)
 
-    def _result(self, task: Task, future: Any) -> Any:
-        """What a task gives; it is submitted again if what it needs was lost with a worker."""
+    def _cancel(self, submitted: Iterable[tuple[Task, Any]]) -> None:
+        """No word of it if the scheduler is gone."""
+        waiting = [future for _, future in submitted]
+        if waiting and self._client.status == "running":
+            with suppress(OSError):
+                self._client.cancel(waiting, force=True)
+
+    def _result(self, submitted: tuple[Task, Any]) -> Any:
+        """The result of a task, which is submitted again if what it needs was lost with a worker."""
+        task, future = submitted
         from distributed import KilledWorker
         from distributed.comm.core import CommClosedError
 

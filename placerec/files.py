@@ -116,7 +116,8 @@ def held_folder(path: Path) -> Iterator[None]:
         return
     handle = os.open(path, os.O_RDONLY)
     try:
-        if not _hold(handle, path):
+        # Another run may have replaced it since it was opened. Where there are no locks nobody is kept out.
+        if locked(handle) is False or not os.path.samestat(os.fstat(handle), path.stat()):
             raise OutputError(f"{path}: is being changed by another run; try again when that has ended")
         yield
     finally:
@@ -286,30 +287,34 @@ def _move_in(partial: Path, target: Path) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _lock(folder: Path) -> int | None:
-    """An open lock on a folder, None if another process has it; the system drops it however its process ends."""
+def locked(handle: int) -> bool | None:
+    """Lock an open file or folder: False if another process has it, None where there are no locks.
+
+    The system drops the lock when the file is closed, however the process ends.
+    """
     if sys.platform == "win32":
         return None
-    handle = None
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        _unlock(handle)
-        return None
-    return handle
-
-
-def _hold(handle: int, path: Path) -> bool:
-    """Lock an open folder that should be `path`: not if another process has it, or has replaced it since."""
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
     except OSError:
-        # A file system without locks keeps nobody out.
-        return True
-    return os.path.samestat(os.fstat(handle), path.stat())
+        return None
+    return True
+
+
+def _lock(path: Path) -> int | None:
+    """An open lock on a file or folder; None if another process has it, or there are no locks."""
+    if sys.platform == "win32":
+        return None
+    try:
+        handle = os.open(path, os.O_RDONLY)
+    except OSError:
+        return None
+    if locked(handle):
+        return handle
+    os.close(handle)
+    return None
 
 
 def _unlock(lock: int | None) -> None:

@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 import threading
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -16,6 +15,7 @@ from functools import partial
 from itertools import chain, islice
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
+from placerec.ahead import look_ahead
 from placerec.errors import PlacerecError
 
 T = TypeVar("T")
@@ -109,7 +109,9 @@ def map_jobs(
 def _threads(function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
     count = processors()
     with ThreadPoolExecutor(count) as pool:
-        yield from _ahead(pool, lambda item: pool.submit(function, item), items, 2 * count)
+        yield from look_ahead(
+            lambda item: pool.submit(function, item), Future.result, items, 2 * count, at_end=partial(_shut, pool)
+        )
 
 
 def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few: int = FEW) -> Iterator[R]:
@@ -121,23 +123,16 @@ def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few
     call = partial(_call, log.getEffectiveLevel())
     with _Workers(jobs, function) as pool:
         try:
-            for answer in _ahead(pool, partial(_submit, pool, call), chain(first, rest), 4 * jobs):
+            submit = partial(_submit, pool, call)
+            items = chain(first, rest)
+            for answer in look_ahead(submit, Future.result, items, 4 * jobs, at_end=partial(_shut, pool)):
                 yield answer.replay()
         except BrokenProcessPool as error:
             raise JobError("a process of the work was killed; give it more memory, or fewer jobs") from error
 
 
-def _ahead(pool: futures.Executor, submit: Callable[[T], Future[R]], items: Iterable[T], window: int) -> Iterator[R]:
-    waiting: deque[Future[R]] = deque()
-    try:
-        for item in items:
-            waiting.append(submit(item))
-            if len(waiting) > window:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
-    finally:
-        pool.shutdown(cancel_futures=True)
+def _shut(pool: futures.Executor, _: Iterable[object]) -> None:
+    pool.shutdown(cancel_futures=True)
 
 
 class _Workers(ProcessPoolExecutor):

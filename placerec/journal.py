@@ -6,7 +6,6 @@ key, the content. A record that is cut or damaged ends what is taken from the fi
 
 import os
 import struct
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -15,11 +14,8 @@ from io import FileIO
 from pathlib import Path
 
 from placerec.errors import OutputError
-from placerec.files import PARTIAL, sweep_files
+from placerec.files import PARTIAL, locked, sweep_files
 from placerec.jobs import JobError
-
-if sys.platform != "win32":
-    import fcntl
 
 _HEAD = struct.Struct("<16sQQ")
 
@@ -97,25 +93,12 @@ def _opened(path: Path, output: Path) -> tuple[FileIO, bool]:
         with suppress(PermissionError):
             handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
             file = os.fdopen(handle, "r+b", buffering=0)
-            if _lock(file):
+            if locked(file.fileno()) is not False:
                 return file, True
             file.close()
         return tempfile.TemporaryFile(dir=path.parent, buffering=0), False
     except OSError as error:
         raise OutputError(f"{output}: cannot be written: {error.strerror or error}") from error
-
-
-def _lock(file: FileIO) -> bool:
-    if sys.platform == "win32":
-        return True
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        # A file system without locks keeps nobody out.
-        return True
-    return True
 
 
 def _read(file: FileIO) -> tuple[bytes, bytes] | None:

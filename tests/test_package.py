@@ -18,7 +18,7 @@ LINE = (
     *("frames", "vision", "words", "lm", "hohmm", "model", "methods"),
     *("evaluation", "figures", "inspection", "experiments", "demo", "cli"),
 )
-COMMON = {"arrays", "cluster", "errors", "files", "jobs", "journal", "version"}
+COMMON = {"ahead", "arrays", "cluster", "errors", "files", "jobs", "journal", "version"}
 ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     # A toolkit for text alone.
     "lm": COMMON | {"lm"},
@@ -28,9 +28,10 @@ ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
     "demo": COMMON | set(LINE[:-1]) | {"lab"},
     "cli": COMMON | set(LINE) | {"lab", "srilm"},
     "files": {"errors"},
-    "jobs": {"errors"},
+    "ahead": set(),
+    "jobs": {"ahead", "errors"},
     "journal": {"errors", "files", "jobs"},
-    "cluster": {"errors", "jobs", "version"},
+    "cluster": {"ahead", "errors", "jobs", "version"},
     "errors": set(),
     "version": set(),
     "arrays": set(),

@@ -10,8 +10,8 @@ from functools import partial, reduce
 
 import numpy as np
 
+from placerec.ahead import work_ahead
 from placerec.arrays import Ints, Mask
-from placerec.lm.ahead import work_ahead
 from placerec.lm.stored_text import Block, Numbers, StoredText
 
 # Windows that may wait for being merged.

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from placerec.ahead import make_ahead
 from placerec.arrays import Floats, Ints, Mask
-from placerec.lm.ahead import make_ahead
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.passage import Passage
 from placerec.srilm.fields import NameTable, split_lines, usual_blocks, with_odd_bytes, without_comments

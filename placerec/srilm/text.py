@@ -7,8 +7,8 @@ from itertools import chain
 
 import numpy as np
 
+from placerec.ahead import work_ahead
 from placerec.arrays import Ints
-from placerec.lm.ahead import work_ahead
 from placerec.lm.counts import NgramCounts, count_text
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.stored_text import BLOCK, Numbers, StoredText

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from placerec.lm import ahead
-from placerec.lm.ahead import make_ahead, work_ahead
+from placerec import ahead
+from placerec.ahead import look_ahead, make_ahead, work_ahead
 
 
 def test_results_come_in_order() -> None:
@@ -17,6 +17,23 @@ def test_results_come_in_order() -> None:
 
     assert list(work_ahead(late, range(20))) == [number * number for number in range(20)]
     assert list(work_ahead(late, [])) == []
+
+
+def test_only_some_tasks_are_begun_and_nobody_waits_for_those_that_are_left() -> None:
+    begun: list[int] = []
+    left: list[int] = []
+
+    def begin(item: int) -> int:
+        begun.append(item)
+        return -item
+
+    results = look_ahead(begin, abs, range(10**9), 3, at_end=left.extend)
+    assert [next(results), next(results)] == [0, 1]
+    assert begun == [0, 1, 2, 3, 4]
+    results.close()  # type: ignore[attr-defined]
+    assert left == [-2, -3, -4]
+    assert list(look_ahead(begin, abs, range(5), 3, at_end=left.extend)) == [0, 1, 2, 3, 4]
+    assert left == [-2, -3, -4]
 
 
 def test_items_come_in_order_from_another_thread() -> None:
