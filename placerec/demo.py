@@ -1,8 +1,7 @@
 """The demonstration: the synthetic laboratory from images to a page to look at."""
 
 import logging
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +18,7 @@ from placerec.frames import find_sequences
 from placerec.hohmm import Beliefs, write_beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import WordTable, typical_images, word_sentences, word_table
+from placerec.jobs import ProgressBar
 from placerec.lab import render_lab
 from placerec.lm.inspection import format_inspection, inspect_model
 from placerec.model import Options, load_recognizer, read_corpus, train_model
@@ -26,7 +26,6 @@ from placerec.vision import Dictionary, describe
 from placerec.words import read_stream
 from placerec.words.tokenize import tokens_of, write_tokens
 
-ProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
 SMOOTHINGS = ("witten-bell", "lidstone")
 ORDERS = (1, 2)
 # The paper's protocol: the first two runs of each condition train, the third tests.

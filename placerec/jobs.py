@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice
@@ -22,12 +23,19 @@ T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 R = TypeVar("R")
 Progress = Callable[[int, int], None]  # items done, items in all
+# Shows what is being done under a label, as long as it takes.
+ProgressBar = Callable[[str], AbstractContextManager[Progress]]
 log = logging.getLogger("placerec")
 
 # For fewer items than this, starting processes takes longer than they save.
 FEW = 5
 # The most processes: Windows waits for no more, and elsewhere systems refuse more sooner or later.
 MOST = 61 if sys.platform == "win32" else 1000
+
+
+def silent(label: str) -> AbstractContextManager[Progress]:
+    """A `ProgressBar` that shows nothing."""
+    return nullcontext(lambda done, total: None)
 
 
 class JobError(PlacerecError):

@@ -124,7 +124,7 @@ def data_line(rows: Sequence[Row]) -> str:
 
 
 def _percent(rows: Sequence[Row], share: Callable[[SequenceCount], int] = lambda one: one.right) -> np.ndarray:
-    """Percent of the frames for every seed, mean over the ways of the rows."""
+    """Percent of the frames for every seed, mean over the settings of the rows."""
     mean: np.ndarray = 100 * np.mean([*by_seed(rows, share).values()], axis=0)
     return mean
 
@@ -146,15 +146,15 @@ def baselines_table(rows: Sequence[Row]) -> Table:
             plain = _of(own, smoothing="witten-bell", select="none")
             runs = {(row.seed, row.fold): row.same_word_run for row in own}
             seeds = by_seed(own)
-            way = max(sorted(seeds), key=lambda way: np.mean(seeds[way]))
+            setting = max(sorted(seeds), key=lambda setting: np.mean(seeds[setting]))
             lines.append(
                 (
                     *(str(size), transition, f"{np.mean([*runs.values()]):.2f}"),
                     f"{_percent(own, lambda one: one.majority).mean():.1f}",
                     f"{_percent(plain, lambda one: one.frame_wise).mean():.1f}",
                     *(_text(_percent(_of(plain, order=order))) for order in (1, 2)),
-                    _text(100 * np.array(seeds[way])),
-                    f"{way.smoothing}, {way.select}, n = {way.order}",
+                    _text(100 * np.array(seeds[setting])),
+                    f"{setting.smoothing}, {setting.select}, n = {setting.order}",
                 )
             )
     head = ("S", "transitions", "same-word run", "most frequent place", "each frame alone", "n = 1", "n = 2")

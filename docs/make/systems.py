@@ -19,14 +19,15 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
-from placerec.experiments.comparison.benchmark import ALL, Run
+from placerec.experiments.comparison.benchmark import COMPARED, MethodRun
+from placerec.experiments.comparison.encoded import FrontEndCost
 from placerec.experiments.comparison.figure import plot_comparison
-from placerec.experiments.comparison.material import Front
 from placerec.experiments.comparison.results import Comparison, MethodScore, format_methods, format_pairs, judge
 from placerec.experiments.comparison.run import SIZE, compare
 from placerec.files import write_text
 from placerec.frames import find_sequences
 from placerec.hohmm import read_beliefs
+from placerec.methods import HOHMM
 
 SEEDS = range(5)
 MEANS = tuple(name for name in MethodScore.__annotations__ if name not in ("method", "accuracy_low", "accuracy_high"))
@@ -39,14 +40,14 @@ def folds(folder: Path, test: Sequence[str]) -> list[list[Path]]:
     return [named] if named else [[path] for path in sequences]
 
 
-def together(parts: Sequence[tuple[Path, Comparison]], seed: int) -> dict[str, Run]:
+def together(parts: Sequence[tuple[Path, Comparison]], seed: int) -> dict[str, MethodRun]:
     """The beliefs of all folds with one seed, and the mean cost over them."""
     runs = {}
-    for name in ALL:
+    for name in COMPARED:
         files = [path for out, _ in parts for path in sorted((out / "beliefs" / name).glob("*.tsv"))]
         scores = [score for _, found in parts for score in found.scores if score.method == name]
         asked = [score.consulted for score in scores if score.consulted is not None]
-        runs[name] = Run(
+        runs[name] = MethodRun(
             [read_beliefs(path) for path in files],
             float(np.mean([score.microseconds_per_frame for score in scores])),
             float(np.mean(asked)) if asked else None,
@@ -64,9 +65,9 @@ def mean_of(found: Sequence[Comparison], rights: Sequence[dict[str, np.ndarray]]
         means = {name: None if None in its else float(np.mean(its)) for name, its in values.items()}
         low, high = interval(drawn, right[rows[0].method], frames)
         scores.append(replace(rows[0], accuracy_low=low, accuracy_high=high, **means))
-    fronts = [(one.front.descriptor, one.front.word) for one in found]
+    costs = [(one.cost.descriptor, one.cost.word) for one in found]
     pairs = tuple(compare_pairs(right, frames, drawn))
-    return replace(found[0], scores=tuple(scores), pairs=pairs, front=Front(*np.mean(fronts, axis=0).tolist()))
+    return replace(found[0], scores=tuple(scores), pairs=pairs, cost=FrontEndCost(*np.mean(costs, axis=0).tolist()))
 
 
 def compared(folder: Path, test: Sequence[str], size: int, work: Path) -> Comparison:
@@ -78,9 +79,9 @@ def compared(folder: Path, test: Sequence[str], size: int, work: Path) -> Compar
             out = work / folder.name / f"size{size}-seed{seed}-fold{number}"
             parts.append((out, compare([folder], tests, out, size=size, seed=seed, cache=work / "cache")))
         runs = together(parts, seed)
-        found.append(judge(runs, parts[0][1].front, seed))
+        found.append(judge(runs, parts[0][1].cost, seed))
         rights.append({name: count_blocks(run.beliefs)[1] for name, run in runs.items()})
-        frames = count_blocks(runs[ALL[0]].beliefs)[0].frames
+        frames = count_blocks(runs[HOHMM].beliefs)[0].frames
         sys.stderr.write(f"{folder.name}: map {seed + 1} of {len(SEEDS)}\n")
     return mean_of(found, rights, frames)
 
@@ -88,7 +89,7 @@ def compared(folder: Path, test: Sequence[str], size: int, work: Path) -> Compar
 def table(folder: Path, found: Comparison) -> str:
     """A set's table, best first."""
     number, what = found.drawn
-    front = f"descriptor {found.front.descriptor / 1000:.1f} ms, word {found.front.word:.0f} µs"
+    front = f"descriptor {found.cost.descriptor / 1000:.1f} ms, word {found.cost.word:.0f} µs"
     lines = [
         f"{folder.name}: {found.frames} test frames, {number} {what}; always `{found.majority_place}`: "
         f"{100 * found.majority:.1f} %; {front}\n",

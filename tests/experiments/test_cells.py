@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.experiments.grid import read_config
-from placerec.experiments.grid.cells import Cell, CellJob, believe_cell, describe_data, seven_digits
+from placerec.experiments.grid.cells import CellJob, GridCell, believe_cell, describe_data, seven_digits
 from placerec.experiments.grid.run import run_grid
 from placerec.figures import evaluate_files
 from placerec.hohmm import Beliefs, read_beliefs
@@ -60,7 +60,7 @@ def test_rows_are_those_of_the_commands(tmp_path: Path) -> None:
 def test_beliefs_are_those_of_decode_to_the_last_digit(tmp_path: Path) -> None:
     write_grid(tmp_path)
     tokens = tuple(tmp_path / "tokens" / f"run{i}.tsv" for i in (1, 2, 3))
-    for cell in (Cell("witten-bell", 3, "fixed"), Cell("lidstone-backoff", 2, "learned")):
+    for cell in (GridCell("witten-bell", 3, "fixed"), GridCell("lidstone-backoff", 2, "learned")):
         job = CellJob(tokens[:2], tokens[2:], "compress:2", (cell,), 0.9, "frame", tmp_path / "kept.json")
         options = Options(order=cell.order, smoothing=cell.smoothing, select=parse_selection("compress:2"))
         train_lm(tokens[:2], tmp_path / "model", options=options)

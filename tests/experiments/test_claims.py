@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from placerec.experiments.grid.bootstrap import MissingCellsError, drawn, scores
 from placerec.experiments.grid.claims import FAILS, HOLDS, UNKNOWN, judge
-from placerec.experiments.grid.results import Results, Row, SequenceCount
+from placerec.experiments.grid.results import MissingCellsError, Results, Row, SequenceCount, drawn, scores
 
 SELECTS = ("none", "subsample:3", "subsample:5", "compress:3", "unique")
 Percent = Callable[[int, str, str, int, int], float]

@@ -5,6 +5,8 @@ import json
 import logging
 import shutil
 import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +14,9 @@ import pytest
 from helpers.small_world import write_images
 
 from placerec.errors import EvaluationError, MissingExtraError, OutputError, PlacerecError
-from placerec.experiments.comparison import benchmark, material
-from placerec.experiments.comparison import run as module
+from placerec.experiments import store
+from placerec.experiments.comparison import benchmark
+from placerec.experiments.comparison.benchmark import COMPARED, Benchmark, ComparedMethod, MethodRun
 from placerec.experiments.comparison.results import Comparison
 from placerec.experiments.comparison.run import compare
 from placerec.figures import evaluate_files
@@ -100,9 +103,9 @@ def test_a_second_run_does_nothing_again(
     def refuse(*args: object, **options: object) -> None:
         raise AssertionError("done again")
 
-    monkeypatch.setattr(material, "describe", refuse)
+    monkeypatch.setattr(store, "describe", refuse)
     monkeypatch.setattr(Dictionary, "fit", refuse)
-    monkeypatch.setattr(module, "run_method", refuse)
+    monkeypatch.setattr(benchmark, "_timed", refuse)
     monkeypatch.setattr(benchmark, "train_model", refuse)
     run(runs, out)
     for name in ("methods.csv", "pairs.csv", "methods.png"):
@@ -113,15 +116,16 @@ def test_a_killed_run_goes_on_where_it_was(
     runs: Path, done: tuple[Path, Comparison], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
-    original, asked = benchmark.run_method, list[str]()
+    asked: list[str] = []
 
-    def killed(name: str, contest: benchmark.Contest) -> benchmark.Run:
+    def killed(name: str, method: ComparedMethod, benchmark: Benchmark) -> MethodRun:
         asked.append(name)
         if asked == ["hohmm", "majority", "pronobis2007"]:
             raise KeyboardInterrupt
-        return original(name, contest)
+        return method.run(benchmark)
 
-    monkeypatch.setattr(module, "run_method", killed)
+    for name, method in COMPARED.items():
+        monkeypatch.setitem(COMPARED, name, replace(method, run=partial(killed, name, method)))
     with pytest.raises(KeyboardInterrupt):
         run(runs, out, cache=done[0] / "cache")
     assert not (out / "methods.csv").exists()
@@ -138,11 +142,10 @@ def test_other_labels_or_images_are_not_taken_from_the_memory(
     shutil.copytree(runs, again)
     places = again / "run4/localization/places.lst"
     places.write_text(places.read_text(encoding="utf-8").replace(" kitchen", " hall"), encoding="utf-8")
-    before = {path.name for path in (out / "cache").iterdir()}
+    before = sorted((out / "cache/descriptors").iterdir())
     found = run(again, out)
     # No image is described again for a label.
-    fresh = {path.name.split("-")[0] for path in (out / "cache").iterdir() if path.name not in before}
-    assert "descriptors" not in fresh
+    assert sorted((out / "cache/descriptors").iterdir()) == before
     assert found.majority == 0.75
     assert set(evaluate_files([out / "beliefs/knn/run4.tsv"]).per_place) == {"hall", "kitchen"}
     assert evaluate_files([out / "beliefs/knn/run4.tsv"]).per_place["kitchen"].frames == 0
@@ -232,8 +235,8 @@ def test_the_cost_of_the_cascade_has_its_second_looks(done: tuple[Path, Comparis
     (score,) = (score for score in done[1].scores if score.method == "pronobis2007")
     assert score.consulted == facts["consulted"]
     assert 0 <= facts["consulted"] <= 1
-    fronts = [json.loads(path.read_text(encoding="utf-8")) for path in (done[0] / "cache").glob("front-*.json")]
-    assert len(fronts) >= 2
-    least = facts["consulted"] * min(front["descriptor"] for front in fronts)
+    costs = [json.loads(path.read_text(encoding="utf-8")) for path in (done[0] / "cache/costs").iterdir()]
+    assert len(costs) >= 2
+    least = facts["consulted"] * min(cost["descriptor"] for cost in costs)
     assert score.microseconds_per_frame >= least
     assert np.isfinite(score.microseconds_per_frame)

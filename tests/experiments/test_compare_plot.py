@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from placerec.experiments.comparison.encoded import FrontEndCost
 from placerec.experiments.comparison.figure import plot_comparison, spread
-from placerec.experiments.comparison.material import Front
 from placerec.experiments.comparison.results import Comparison, MethodScore
 
 pytest.importorskip("matplotlib")
 
 
 def comparison(*scores: MethodScore) -> Comparison:
-    return Comparison(scores, (), 120, 0.4, "a$b$ hall", (3, "sequences"), Front(6500.0, 120.0))
+    return Comparison(scores, (), 120, 0.4, "a$b$ hall", (3, "sequences"), FrontEndCost(6500.0, 120.0))
 
 
 def score(name: str, accuracy: float, cost: float, consulted: float | None = None) -> MethodScore:

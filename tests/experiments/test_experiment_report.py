@@ -13,8 +13,8 @@ from helpers.small_world import write_images
 from placerec.cli import commands
 from placerec.experiments.grid import Config, Results, experiment, report
 from placerec.experiments.grid.claims import CLAIMS
+from placerec.experiments.grid.jobs import GridJob
 from placerec.experiments.grid.tables import markdown, ranked
-from placerec.experiments.grid.units import Unit
 from placerec.figures import evaluate_files
 
 IMAGES = """
@@ -98,9 +98,9 @@ def test_what_is_there_is_not_made_again(world: Path, monkeypatch: pytest.Monkey
     pages: list[Path] = []
     real = report._write
 
-    def write(results: Results, plan: Config, config: Path, units: Sequence[Unit], out: Path) -> None:
+    def write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob], out: Path) -> None:
         pages.append(out)
-        real(results, plan, config, units, out)
+        real(results, plan, config, jobs, out)
 
     monkeypatch.setattr(report, "_write", write)
     page = world / "out" / "report.html"

@@ -7,7 +7,7 @@ from helpers.small_experiment import CONFIG, write_grid
 
 from placerec.experiments.grid import read_config
 from placerec.experiments.grid.figure import draw_figure
-from placerec.experiments.grid.results import Row, SequenceCount, Way, by_seed
+from placerec.experiments.grid.results import Row, SequenceCount, Setting, by_seed
 
 
 def row(seed: int, fold: str, right: int, order: int = 1) -> Row:
@@ -17,8 +17,8 @@ def row(seed: int, fold: str, right: int, order: int = 1) -> Row:
 
 def test_a_seed_is_one_number_over_all_folds() -> None:
     rows = [row(0, "a", 60), row(0, "b", 80), row(1, "a", 90), row(1, "b", 90)]
-    assert by_seed(rows) == {Way(4, "witten-bell", "none", 1, "fixed"): [0.7, 0.9]}
-    assert by_seed(rows, lambda one: one.majority) == {Way(4, "witten-bell", "none", 1, "fixed"): [0.3, 0.3]}
+    assert by_seed(rows) == {Setting(4, "witten-bell", "none", 1, "fixed"): [0.7, 0.9]}
+    assert by_seed(rows, lambda one: one.majority) == {Setting(4, "witten-bell", "none", 1, "fixed"): [0.3, 0.3]}
 
 
 @pytest.mark.parametrize("narrow", [False, True])

@@ -13,7 +13,8 @@ from helpers.small_experiment import CONFIG, write_grid
 from helpers.small_world import write_images, write_tokens
 
 from placerec.errors import ExperimentError, OutputError, StreamError
-from placerec.experiments.grid import cells, experiment, read_config, tokens
+from placerec.experiments import store
+from placerec.experiments.grid import cells, experiment, read_config
 from placerec.experiments.grid.run import run_grid
 from placerec.files import held_folder
 from placerec.vision import Dictionary
@@ -45,7 +46,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
         monkeypatch.setattr(module, name, work)
 
-    counted(tokens, "_describe", lambda *args: 1)
+    counted(store, "_describe", lambda some, *args: len(some))
     counted(Dictionary, "fit", lambda *args: 1)
     counted(cells, "_computed", lambda job, missing: len(missing))
     return done

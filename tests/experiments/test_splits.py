@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from placerec.errors import ExperimentError
+from placerec.experiments.grid.jobs import find_images
 from placerec.experiments.grid.splits import (
     Fold,
     cold_saarbruecken_b,
@@ -12,7 +13,6 @@ from placerec.experiments.grid.splits import (
     leave_one_out,
     named_tests,
 )
-from placerec.experiments.grid.tokens import find_images
 
 PART_B = [f"seq{path}_{light}{run}" for path in "34" for light in ("cloudy", "night", "sunny") for run in "123"]
 

@@ -1,59 +1,49 @@
-"""Every method on the same test frames: fitted, run on-line one frame after the other, and timed."""
+"""Every method on the same test frames: fitted, run on-line one frame after the other, and timed.
+
+A method is added in COMPARED alone: how it is fitted and run, what it is made of, and what it needs.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.experiments.comparison.material import Look, digest
+from placerec.arrays import Floats
+from placerec.experiments.comparison.encoded import EncodedSequences
+from placerec.experiments.store import key_of
 from placerec.hohmm import Beliefs, Recognizer
 from placerec.lm.union import unite_models
 from placerec.methods import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
 from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
 from placerec.model import Decoder, Decoding, Options, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
-from placerec.version import __version__
 from placerec.words import Selection, place_steps, sentences_per_place
 
-FIXED = f"{HOHMM}-fixed"
-# What `hohmm` is without the words before: its models' unigrams, its smoothing and transitions.
-MEMORYLESS = f"{HOHMM}-order1"
-CASCADE = "pronobis2007"
-# The paper's transitions where a system has a filter, unless its source learns them, or it stands beside `hohmm`.
-LEARNED = (HOHMM, MEMORYLESS, "mtd")
 # Each method is run so often over the test frames; the fastest run is told.
 RUNS = 3
-Floats = NDArray[np.float64]
-Step = Callable[[Any], Floats]
-Follow = Callable[[], Step]
-
-POINT_METHODS: dict[str, Callable[[DescriptorTrainingSet, int], MakePointStepper]] = {
-    "torralba2003": lambda training, seed: torralba2003.fit(training, seed=seed),
-    "ullah2008": lambda training, seed: ullah2008.fit(training, seed=seed),
-    "ullah2008-hmm": lambda training, seed: ullah2008.fit_filtered(training, seed=seed),
-    "knn": lambda training, seed: knn.fit(training),
-}
-# In the order of the table.
-ALL = (HOHMM, FIXED, MEMORYLESS, *(name for name in METHODS if name != HOHMM), CASCADE, *POINT_METHODS)
+# What a method gets of a frame.
+WORDS, TWO_WORDS, DESCRIPTORS = "words", "words, two dictionaries", "descriptors"
+# A frame's word (or two, or components) to its belief float64 (C,); and what begins a sequence.
+StepFunction = Callable[[Any], Floats]
+MakeStepper = Callable[[], StepFunction]
 
 
 @dataclass(frozen=True)
-class Contest:
+class Benchmark:
     """The sequences through one dictionary, the first `training` of them to learn from, and the models of these.
 
-    `again`: the same through the second dictionary, where a method asks for it.
+    `second`: the sequences through a second dictionary, where a method asks for it. `seed`: of what a method draws.
     """
 
-    look: Look
+    encoded: EncodedSequences
     training: int
     models: PlaceModels
     seed: int
-    again: Look | None = None
+    second: EncodedSequences | None = None
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -63,19 +53,19 @@ class Contest:
     @property
     def tests(self) -> range:
         """The numbers of the test sequences."""
-        return range(self.training, len(self.look.streams))
+        return range(self.training, len(self.encoded.streams))
 
     @cached_property
     def key(self) -> str:
-        """A digest of all that beliefs depend on, but for the method."""
-        parts: list[object] = [self.training, self.seed, self.look.dictionary.fingerprint]
-        for stream, points in zip(self.look.streams, self.look.points, strict=True):
+        """A digest of all that beliefs depend on, but for the method and the second dictionary."""
+        parts: list[object] = [self.training, self.seed, self.encoded.dictionary.fingerprint]
+        for stream, points in zip(self.encoded.streams, self.encoded.points, strict=True):
             parts += [stream.name, stream.frames, stream.places, stream.words, stream.times, points]
-        return digest(*parts)
+        return key_of(*parts)
 
 
 @dataclass(frozen=True)
-class Run:
+class MethodRun:
     """Beliefs on the test sequences; `microseconds` a frame, and the share that asked the second cue, if there is one.
 
     The time is that of the method alone, from the word (or the descriptor's components) to the belief, the mean over
@@ -87,119 +77,145 @@ class Run:
     consulted: float | None = None
 
 
-def train_models(look: Look, training: int, folder: Path) -> PlaceModels:
-    """The n-gram models of the training sequences, with the default options, in a MODEL/ folder."""
-    streams = look.streams[:training]
-    content = [part for s in streams for part in (s.name, s.places, s.words, s.times, s.distances)]
-    path = folder / f"model-{digest(look.dictionary.fingerprint, __version__, *content)}"
+@dataclass(frozen=True)
+class ComparedMethod:
+    """How a method is fitted and run, what it gets of each frame, and an optional package that it needs."""
+
+    run: Callable[[Benchmark], MethodRun]
+    kind: str = WORDS
+    package: str | None = None
+
+
+def train_models(encoded: EncodedSequences, training: int, cache: Path) -> PlaceModels:
+    """The n-gram models of the first `training` sequences, with the default options, in a MODEL/ folder in `cache`."""
+    streams, dictionary = encoded.streams[:training], encoded.dictionary
+    content = [
+        part
+        for stream in streams
+        for part in (stream.name, stream.places, stream.words, stream.times, stream.distances)
+    ]
+    path = cache / "models" / key_of(dictionary.fingerprint, *content)
     if not path.exists():
         sentences = [sentences_per_place([stream], Selection()) for stream in streams]
-        record = record_streams(zip(streams, sentences, strict=True), look.dictionary.fingerprint)
-        train_model(
-            sentences_per_place(streams, Selection()),
-            look.dictionary.vocabulary,
-            path,
-            options=Options(),
-            record=record,
-        )
+        record = record_streams(zip(streams, sentences, strict=True), dictionary.fingerprint)
+        together = sentences_per_place(streams, Selection())
+        train_model(together, dictionary.vocabulary, path, options=Options(), record=record)
     return load_model(path)
 
 
-def run_method(name: str, contest: Contest) -> Run:
-    """Fit one of the methods `ALL` and follow every test sequence with it."""
-    if name == CASCADE:
-        return _run_cascade(contest)
-    if name in POINT_METHODS:
-        follow: Follow = POINT_METHODS[name](_descriptor_training_set(contest), contest.seed)
-        return _timed(follow, contest, [contest.look.points[i].astype(np.float64) for i in contest.tests])
-    return _timed(_decoder(name, contest.models), contest, [contest.look.streams[i].words for i in contest.tests])
+def _run_words(name: str, transition: str, benchmark: Benchmark) -> MethodRun:
+    """A method of `placerec decode`."""
+    return _decoded(make_decoder(name, benchmark.models, options=Decoding(transition=transition)), benchmark)
+
+
+def _run_order1(benchmark: Benchmark) -> MethodRun:
+    """`hohmm` without the words before: the unigrams, smoothing and transitions of the models."""
+    models = benchmark.models
+    transition = transition_of(models, Decoding(transition="learned"))
+    return _decoded(Recognizer(models.models, transition=transition, emissions=_Unigrams(models)), benchmark)
 
 
 class _Unigrams:
-    """Emissions of the same models for words without those before them."""
+    """Emissions of the places' models for words without those before them."""
 
     def __init__(self, models: PlaceModels) -> None:
         self._emissions = unite_models(list(models.models.values()))
 
     def score(self, words: Sequence[str]) -> Floats:
-        """As `Emissions` has it."""
+        """log10 p of each of T words in each of C places, float64 (T, C)."""
         return np.concatenate([self._emissions.score([word]) for word in words])
 
     def follow(self) -> Callable[[str], Sequence[float]]:
-        """As `Emissions` has it."""
+        """What gives log10 p of a word in each place."""
         return lambda word: self._emissions.follow()(word)
 
 
-def _decoder(name: str, models: PlaceModels) -> Follow:
-    options = Decoding(transition="learned" if name in LEARNED else "fixed")
-    decoder: Decoder
-    if name == MEMORYLESS:
-        transition = transition_of(models, options)
-        decoder = Recognizer(models.models, transition=transition, emissions=_Unigrams(models))
-    else:
-        decoder = make_decoder(HOHMM if name == FIXED else name, models, options=options)
-
-    def follow() -> Step:
+def _decoded(decoder: Decoder, benchmark: Benchmark) -> MethodRun:
+    def start() -> StepFunction:
         decoder.reset()
         return lambda word: decoder.update(word).probability
 
-    return follow
+    return _timed(start, benchmark, [benchmark.encoded.streams[i].words for i in benchmark.tests])
 
 
-def _descriptor_training_set(contest: Contest) -> DescriptorTrainingSet:
-    """The labelled training frames as points."""
-    places = contest.places
-    streams = contest.look.streams[: contest.training]
+def _run_points(fit: Callable[[DescriptorTrainingSet, int], MakePointStepper], benchmark: Benchmark) -> MethodRun:
+    """A method of descriptors, which learns from the labelled training frames as points."""
+    places = benchmark.places
+    streams = benchmark.encoded.streams[: benchmark.training]
     truth = np.concatenate([stream.table.places.codes(places) for stream in streams])
     sequences = np.repeat(np.arange(len(streams)), [len(stream) for stream in streams])
-    points = np.concatenate(contest.look.points[: contest.training]).astype(np.float64)
+    points = np.concatenate(benchmark.encoded.points[: benchmark.training]).astype(np.float64)
     steps = np.sum([place_steps(stream, places) for stream in streams], axis=0)
     labelled = truth >= 0
-    return DescriptorTrainingSet(points[labelled], truth[labelled], sequences[labelled], places, steps)
+    training = DescriptorTrainingSet(points[labelled], truth[labelled], sequences[labelled], places, steps)
+    tests = [benchmark.encoded.points[i].astype(np.float64) for i in benchmark.tests]
+    return _timed(fit(training, benchmark.seed), benchmark, tests)
 
 
-def _run_cascade(contest: Contest) -> Run:
+def _run_cascade(benchmark: Benchmark) -> MethodRun:
     """The words of both dictionaries; what a second word costs is added for the frames that ask for it."""
-    if contest.again is None:
+    if benchmark.second is None:
         raise ValueError("the cascade needs a second dictionary")
-    looks = (contest.look, contest.again)
-    training = range(contest.training)
-    truth = np.concatenate([contest.look.streams[i].table.places.codes(contest.places) for i in training])
-    sequences = np.repeat(training, [len(contest.look.streams[i]) for i in training])
-    units = [np.concatenate([one.units(i) for i in training])[truth >= 0] for one in looks]
-    words = [len(one.dictionary.vocabulary) for one in looks]
-    answer = pronobis2007.fit(units, truth[truth >= 0], sequences[truth >= 0], words, len(contest.places))
+    both = (benchmark.encoded, benchmark.second)
+    training = range(benchmark.training)
+    truth = np.concatenate([benchmark.encoded.streams[i].table.places.codes(benchmark.places) for i in training])
+    sequences = np.repeat(training, [len(benchmark.encoded.streams[i]) for i in training])
+    units = [np.concatenate([one.units(i) for i in training])[truth >= 0] for one in both]
+    words = [len(one.dictionary.vocabulary) for one in both]
+    answer = pronobis2007.fit(units, truth[truth >= 0], sequences[truth >= 0], words, len(benchmark.places))
     asked = 0
 
-    def follow() -> Step:
-        def step(pair: tuple[int, int]) -> Floats:
-            nonlocal asked
-            belief, consulted = answer(pair[0], lambda: pair[1])
-            asked += consulted
-            return belief
+    def step(pair: tuple[int, int]) -> Floats:
+        nonlocal asked
+        belief, consulted = answer(pair[0], lambda: pair[1])
+        asked += consulted
+        return belief
 
-        return step
-
-    pairs = [list(zip(*(one.units(i).tolist() for one in looks), strict=True)) for i in contest.tests]
-    run = _timed(follow, contest, pairs)
+    pairs = [list(zip(*(one.units(i).tolist() for one in both), strict=True)) for i in benchmark.tests]
+    run = _timed(lambda: step, benchmark, pairs)
     share = asked / (RUNS * sum(map(len, pairs)))
-    second = contest.again.front
-    return Run(run.beliefs, run.microseconds + share * (second.descriptor + second.word), share)
+    cost = benchmark.second.cost
+    return MethodRun(run.beliefs, run.microseconds + share * (cost.descriptor + cost.word), share)
 
 
-def _timed(follow: Follow, contest: Contest, inputs: Sequence[Any]) -> Run:
+def _timed(start: MakeStepper, benchmark: Benchmark, inputs: Sequence[Any]) -> MethodRun:
     """The beliefs over each sequence of inputs, and the time of the fastest of some runs."""
     found: list[list[Floats]] = []
     fastest = np.inf
     for _ in range(RUNS):
         found, spent = [], 0.0
         for sequence in inputs:
-            step = follow()
+            step = start()
             started = perf_counter()
             rows = [step(one) for one in sequence]
             spent += perf_counter() - started
             found.append(rows)
         fastest = min(fastest, spent)
-    streams = [contest.look.streams[i] for i in contest.tests]
-    beliefs = [Beliefs.of(stream, contest.places, np.array(rows)) for stream, rows in zip(streams, found, strict=True)]
-    return Run(beliefs, 1e6 * fastest / sum(map(len, inputs)))
+    streams = [benchmark.encoded.streams[i] for i in benchmark.tests]
+    beliefs = [Beliefs.of(one, benchmark.places, np.array(rows)) for one, rows in zip(streams, found, strict=True)]
+    return MethodRun(beliefs, 1e6 * fastest / sum(map(len, inputs)))
+
+
+def _words(name: str, transition: str = "fixed") -> ComparedMethod:
+    return ComparedMethod(partial(_run_words, name, transition))
+
+
+def _points(
+    fit: Callable[[DescriptorTrainingSet, int], MakePointStepper], package: str | None = None
+) -> ComparedMethod:
+    return ComparedMethod(partial(_run_points, fit), DESCRIPTORS, package)
+
+
+# In the order of the table. The paper's transitions where a method has a filter, unless its source learns them, or it
+# stands beside `hohmm`.
+COMPARED: dict[str, ComparedMethod] = {
+    HOHMM: _words(HOHMM, "learned"),
+    f"{HOHMM}-fixed": _words(HOHMM),
+    f"{HOHMM}-order1": ComparedMethod(_run_order1),
+    **{name: _words(name, "learned" if name == "mtd" else "fixed") for name in METHODS if name != HOHMM},
+    "pronobis2007": ComparedMethod(_run_cascade, TWO_WORDS),
+    "torralba2003": _points(lambda training, seed: torralba2003.fit(training, seed=seed)),
+    "ullah2008": _points(lambda training, seed: ullah2008.fit(training, seed=seed), "sklearn"),
+    "ullah2008-hmm": _points(lambda training, seed: ullah2008.fit_filtered(training, seed=seed), "sklearn"),
+    "knn": _points(lambda training, seed: knn.fit(training), "sklearn"),
+}

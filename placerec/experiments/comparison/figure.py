@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.evaluation.summary import percent, shorten
-from placerec.experiments.comparison.benchmark import POINT_METHODS
+from placerec.experiments.comparison.benchmark import COMPARED, DESCRIPTORS, TWO_WORDS, WORDS
 from placerec.experiments.comparison.results import Comparison, MethodScore
 from placerec.figures.panels import figure_file, place_colours
 
@@ -19,7 +19,7 @@ _WIDTH, _LEAST_HEIGHT = 10.0, 5.2
 _TITLE = 0.65
 # The height of a label in inches, and the least cost that is drawn, in microseconds.
 _LABEL, _LEAST = 0.19, 0.1
-_KINDS = ("words", "words, two dictionaries", "descriptors")
+_KINDS = (WORDS, TWO_WORDS, DESCRIPTORS)
 
 
 def plot_comparison(found: Comparison, path: Path | str) -> None:
@@ -135,9 +135,7 @@ def spread(wanted: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
 
 
 def _kind(score: MethodScore) -> str:
-    if score.consulted is not None:
-        return _KINDS[1]
-    return _KINDS[2] if score.method in POINT_METHODS else _KINDS[0]
+    return COMPARED[score.method].kind if score.method in COMPARED else WORDS
 
 
 def _caption(found: Comparison) -> str:
@@ -145,8 +143,8 @@ def _caption(found: Comparison) -> str:
     over = f"over {number} test sequences" if what == "sequences" else f"over the {number} visits of one sequence"
     lines = [
         f"Intervals: bootstrap {over}. Cost: one frame at a time, from its word or its components to the belief;",
-        f"before it, each needs the descriptor ({found.front.descriptor / 1000:.1f} ms) and its components or word "
-        f"({found.front.word:.0f} µs).",
+        f"before it, each needs the descriptor ({found.cost.descriptor / 1000:.1f} ms) and its components or word "
+        f"({found.cost.word:.0f} µs).",
     ]
     for score in found.scores:
         if score.consulted is not None:

@@ -6,8 +6,8 @@ from typing import Any
 
 from placerec.evaluation.bootstrap import Pair, compare_pairs, count_blocks, draw, interval
 from placerec.evaluation.metrics import evaluate
-from placerec.experiments.comparison.benchmark import Run
-from placerec.experiments.comparison.material import Front
+from placerec.experiments.comparison.benchmark import MethodRun
+from placerec.experiments.comparison.encoded import FrontEndCost
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class MethodScore:
 class Comparison:
     """What `compare` found; `drawn`: the intervals are over so many `sequences`, or `visits` of one sequence.
 
-    `front`: what comes before every method; `majority`: the share of the most frequent place among the test frames.
+    `cost`: what comes before every method; `majority`: the share of the most frequent place among the test frames.
     """
 
     scores: tuple[MethodScore, ...]
@@ -38,10 +38,10 @@ class Comparison:
     majority: float
     majority_place: str
     drawn: tuple[int, str]
-    front: Front
+    cost: FrontEndCost
 
 
-def judge(runs: Mapping[str, Run], front: Front, seed: int) -> Comparison:
+def judge(runs: Mapping[str, MethodRun], cost: FrontEndCost, seed: int) -> Comparison:
     """The scores of all methods with intervals over the same draws, and every pair."""
     evaluations = {name: evaluate(run.beliefs) for name, run in runs.items()}
     counted = {name: count_blocks(run.beliefs) for name, run in runs.items()}
@@ -69,7 +69,7 @@ def judge(runs: Mapping[str, Run], front: Front, seed: int) -> Comparison:
         one.majority_accuracy,
         one.majority_place,
         (len(blocks.frames), blocks.what),
-        front,
+        cost,
     )
 
 

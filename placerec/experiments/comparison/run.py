@@ -9,28 +9,28 @@ OUT/cache/                  what a second run does not do again: descriptors, wo
 
 import json
 import logging
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from placerec.errors import EvaluationError, OutputError, SourceError, check_optional
+from placerec.errors import EvaluationError, SourceError, check_optional
 from placerec.evaluation.bootstrap import LEAST
-from placerec.experiments.comparison.benchmark import ALL, CASCADE, Contest, Run, run_method, train_models
+from placerec.experiments.comparison.benchmark import COMPARED, TWO_WORDS, Benchmark, MethodRun, train_models
+from placerec.experiments.comparison.encoded import encode
 from placerec.experiments.comparison.figure import plot_comparison
-from placerec.experiments.comparison.material import CENTRIST, GIST, digest, look
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
+from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
 from placerec.figures.panels import check_figure
-from placerec.files import held_folder, read_text, whole_folder, write_text
+from placerec.files import whole_folder, write_text
 from placerec.frames import Reading, find_sequences
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.naming import own_name, unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
-from placerec.version import __version__
+from placerec.jobs import ProgressBar, silent
+from placerec.vision import DescriptorSpec
 
-ProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
-NEED_SKLEARN = ("ullah2008", "ullah2008-hmm", "knn")
+# Of the dictionary that methods use, and of a second one for those that ask for it.
+SPECS = (DescriptorSpec(), DescriptorSpec(kind="centrist"))
 # The larger of the paper's two maps, with which it recognises rooms better.
 SIZE = 20
 RUN_JSON = "run.json"
@@ -48,7 +48,7 @@ def compare(
     seed: int = 0,
     reading: Reading = Reading(),
     cache: Path | str | None = None,
-    progress: ProgressBar = lambda label: nullcontext(lambda done, total: None),
+    progress: ProgressBar = silent,
 ) -> Comparison:
     """Learn on the sequences of `train` that `test` does not name, run every method on those of `test`, write `out`.
 
@@ -62,22 +62,22 @@ def compare(
     out = Path(out)
     check_figure(out / "methods.png")
     training, tests = _split(train, test, reading)
-    _make(out)
-    with held_folder(out):
-        cache = out / "cache" if cache is None else Path(cache)
-        looks = []
-        for spec in (GIST, CENTRIST)[: 1 + (CASCADE in chosen)]:
+    cache = out / "cache" if cache is None else Path(cache)
+    with held_output(out):
+        encoded = []
+        for spec in SPECS[: 1 + any(COMPARED[name].kind == TWO_WORDS for name in chosen)]:
             with progress(f"describe ({spec.kind})") as show:
-                one = look([*training, *tests], len(training), spec, size=size, seed=seed, cache=cache, progress=show)
-                looks.append(one)
-        models = train_models(looks[0], len(training), cache)
-        contest = Contest(looks[0], len(training), models, seed, *looks[1:])
+                described = describe_all([*training, *tests], spec, cache, progress=show)
+                both = tuple(described[: len(training)]), tuple(described[len(training) :])
+                encoded.append(encode(WordsJob(*both, size, seed, "live", cache)))
+        models = train_models(encoded[0], len(training), cache)
+        benchmark = Benchmark(encoded[0], len(training), models, seed, *encoded[1:])
         runs = {}
         with progress("methods") as show:
             for done, name in enumerate(chosen, start=1):
-                runs[name] = _run(name, contest, out / "beliefs" / name)
+                runs[name] = _method_run(name, benchmark, out / "beliefs" / name)
                 show(done, len(chosen))
-        found = judge(runs, looks[0].front, seed)
+        found = judge(runs, encoded[0].cost, seed)
         write_text(out / "methods.csv", format_methods(found.scores))
         write_text(out / "pairs.csv", format_pairs(found.pairs))
         plot_comparison(found, out / "methods.png")
@@ -87,20 +87,20 @@ def compare(
 
 def check_methods(methods: Iterable[str] | None = None) -> list[str]:
     """The methods in the order of the table, all of them for None; EvaluationError for an unknown one or none."""
-    names = set(ALL if methods is None else methods)
+    names = set(COMPARED if methods is None else methods)
     for name in sorted(names):
-        if name not in ALL:
-            raise EvaluationError(f"no method is called {name!r}; choose from {', '.join(ALL)}")
+        if name not in COMPARED:
+            raise EvaluationError(f"no method is called {name!r}; choose from {', '.join(COMPARED)}")
     if not names:
-        raise EvaluationError(f"no method is named; choose from {', '.join(ALL)}")
-    return [name for name in ALL if name in names]
+        raise EvaluationError(f"no method is named; choose from {', '.join(COMPARED)}")
+    return [name for name in COMPARED if name in names]
 
 
 def _check_installed(names: Iterable[str]) -> None:
     """Before any work: MissingExtraError for the first method that cannot run."""
     for name in names:
-        if name in NEED_SKLEARN:
-            check_optional("sklearn", name, "leave it out of --methods")
+        if package := COMPARED[name].package:
+            check_optional(package, name, "leave it out of --methods")
 
 
 def _split(
@@ -129,42 +129,23 @@ def _split(
     return training, tests
 
 
-def _make(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{out}: cannot be written: {error.strerror or error}") from error
-
-
-def _run(name: str, contest: Contest, folder: Path) -> Run:
+def _method_run(name: str, benchmark: Benchmark, folder: Path) -> MethodRun:
     """The run in `folder` if it is one on the same data, or else a new one, which is left there."""
-    key = digest(
-        name,
-        contest.key,
-        contest.again.dictionary.fingerprint if contest.again and name == CASCADE else "",
-        __version__,
-    )
-    known = _facts(folder / RUN_JSON)
+    method = COMPARED[name]
+    second = benchmark.second.dictionary.fingerprint if benchmark.second and method.kind == TWO_WORDS else ""
+    key = key_of(name, benchmark.key, second)
+    known = load(folder / RUN_JSON)
     if known.get("key") == key:
         log.info("%s: as the run before left it", name)
-        beliefs = [read_beliefs(folder / f"{contest.look.streams[i].name}.tsv") for i in contest.tests]
-        return Run(beliefs, known["microseconds_per_frame"], known["consulted"])
-    run = run_method(name, contest)
+        beliefs = [read_beliefs(folder / f"{benchmark.encoded.streams[i].name}.tsv") for i in benchmark.tests]
+        return MethodRun(beliefs, known["microseconds_per_frame"], known["consulted"])
+    run = method.run(benchmark)
     with whole_folder(folder, OWNED) as partial:
         for beliefs_of_one in run.beliefs:
             write_beliefs(partial / f"{beliefs_of_one.name}.tsv", beliefs_of_one)
         facts = {"key": key, "method": name, "microseconds_per_frame": run.microseconds, "consulted": run.consulted}
         write_text(partial / RUN_JSON, json.dumps(facts, indent=2) + "\n")
     return run
-
-
-def _facts(path: Path) -> dict[str, Any]:
-    """What a run.json holds; nothing if there is none, or none that can be read."""
-    try:
-        facts = json.loads(read_text(path, EvaluationError)) if path.exists() else {}
-    except ValueError:
-        facts = {}
-    return facts if isinstance(facts, dict) else {}
 
 
 def _tell(out: Path, found: Comparison) -> None:
@@ -180,8 +161,8 @@ def _tell(out: Path, found: Comparison) -> None:
         log.warning("no difference between methods can hold with fewer than %d test %s", LEAST, what)
     log.info(
         "before every method a frame takes %.1f ms to describe and %.0f us to find its word, reading not counted",
-        found.front.descriptor / 1000,
-        found.front.word,
+        found.cost.descriptor / 1000,
+        found.cost.word,
     )
     for score in found.scores:
         if score.consulted is not None:

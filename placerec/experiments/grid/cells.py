@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from placerec.evaluation import evaluate
 from placerec.evaluation.metrics import change_latencies, codes, right_frames
-from placerec.experiments.grid import cache
+from placerec.experiments.store import load, save
 from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition
 from placerec.hohmm.evidence import evidence_in
 from placerec.hohmm.offline import believe
@@ -28,7 +28,7 @@ from placerec.model.corpus import read_streams
 from placerec.words import Selection, WordStream, parse_selection, place_steps
 
 
-class Cell(NamedTuple):
+class GridCell(NamedTuple):
     """One way to make models and to filter with them; the selection is that of its `CellJob`."""
 
     smoothing: str
@@ -46,12 +46,12 @@ class CellJob:
     train: tuple[Path, ...]
     test: tuple[Path, ...]
     select: str
-    cells: tuple[Cell, ...]
+    cells: tuple[GridCell, ...]
     stay: float
     per: str
     kept: Path
 
-    def name(self, cell: Cell) -> str:
+    def name(self, cell: GridCell) -> str:
         """What a cell is kept as: all that it depends on beside the job."""
         filter_ = ("learned",) if cell.transition == "learned" else (cell.transition, f"{self.stay!r}", self.per)
         return " ".join((cell.smoothing, str(cell.order), *filter_))
@@ -62,15 +62,15 @@ def run_cells(job: CellJob) -> dict[str, Any]:
 
     Only those are computed that are not kept already.
     """
-    results = cache.load(job.kept)
+    results = load(job.kept)
     missing = [cell for cell in job.cells if job.name(cell) not in results]
     if missing:
         results |= _computed(job, missing)
-        cache.save(job.kept, results)
+        save(job.kept, results)
     return results
 
 
-def believe_cell(job: CellJob, cell: Cell) -> list[Beliefs]:
+def believe_cell(job: CellJob, cell: GridCell) -> list[Beliefs]:
     """The beliefs of one cell over the test sequences, computed anew."""
     return next(_believed(job, _read(job, [cell]), [cell]))[1]
 
@@ -86,14 +86,14 @@ class _Streams:
     words: list[NgramCounts]
 
 
-def _read(job: CellJob, cells: Sequence[Cell]) -> _Streams:
+def _read(job: CellJob, cells: Sequence[GridCell]) -> _Streams:
     corpus = read_corpus(job.train, selection=parse_selection(job.select))
     whole = read_corpus(job.train, selection=Selection())
     counts = _counts(corpus, max(cell.order for cell in cells))
     return _Streams(corpus, read_streams(job.train), read_streams(job.test), counts, _counts(whole, 1))
 
 
-def _computed(job: CellJob, cells: Sequence[Cell]) -> dict[str, Any]:
+def _computed(job: CellJob, cells: Sequence[GridCell]) -> dict[str, Any]:
     streams = _read(job, cells)
     listed = frozenset(streams.corpus.vocabulary)
     for stream in streams.tests:
@@ -104,7 +104,7 @@ def _computed(job: CellJob, cells: Sequence[Cell]) -> dict[str, Any]:
     return results | {job.name(cell): judged(beliefs) for cell, beliefs in _believed(job, streams, cells)}
 
 
-def _believed(job: CellJob, streams: _Streams, cells: Sequence[Cell]) -> Iterator[tuple[Cell, list[Beliefs]]]:
+def _believed(job: CellJob, streams: _Streams, cells: Sequence[GridCell]) -> Iterator[tuple[GridCell, list[Beliefs]]]:
     """The cells and their beliefs; models are made once for all transitions."""
     selection = parse_selection(job.select)
     for (smoothing, order), same in groupby(sorted(cells), lambda cell: cell[:2]):

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.evaluation.bootstrap import LEAST, Floats, middle
-from placerec.experiments.grid.bootstrap import MissingCellsError, Scores, mean, scores
-from placerec.experiments.grid.results import Results
+from placerec.experiments.grid.results import MissingCellsError, Results, Scores, mean, scores
 
 HOLDS, FAILS, UNKNOWN = "holds", "does not hold", "cannot tell"
 # Points: what counts as several percent, as no more than a little, and as among the best.
@@ -89,19 +88,19 @@ def judge(results: Results, transition: str) -> list[Claim]:
     return [Claim(name, text, _stated(statements, found, reason)) for name, text, statements in CLAIMS]
 
 
-def _stated(statements: Callable[[Scores], list["Lazy"]], found: Scores, reason: str) -> list[Statement]:
+def _stated(statements: Callable[[Scores], list["ClaimTerm"]], found: Scores, reason: str) -> list[Statement]:
     stated = []
-    for lazy in statements(found):
+    for term in statements(found):
         try:
-            values = lazy.values() if len(found.sequences) > 1 else lazy.values()[:1]
-            stated.append(Statement(lazy.text, values, lazy.side, lazy.threshold, reason))
+            values = term.values() if len(found.sequences) > 1 else term.values()[:1]
+            stated.append(Statement(term.text, values, term.side, term.threshold, reason))
         except MissingCellsError as error:
-            stated.append(Statement(lazy.text, None, lazy.side, lazy.threshold, str(error)))
+            stated.append(Statement(term.text, None, term.side, term.threshold, str(error)))
     return stated
 
 
 @dataclass(frozen=True)
-class Lazy:
+class ClaimTerm:
     """A statement whose values are still to be asked of the grid."""
 
     text: str
@@ -157,31 +156,33 @@ def _spread(s: Scores, select: str) -> Floats:
     return apart
 
 
-def _o1(s: Scores) -> list[Lazy]:
+def _o1(s: Scores) -> list[ClaimTerm]:
     def values() -> Floats:
         if len(s.size) < 2:
             raise MissingCellsError("the grid has one size only")
         return mean(s.take(size=[s.size[-1]]) - s.take(size=[s.size[0]]))
 
-    return [Lazy(f"S = {s.size[-1]} minus S = {s.size[0]}, mean over all cells", values)]
+    return [ClaimTerm(f"S = {s.size[-1]} minus S = {s.size[0]}, mean over all cells", values)]
 
 
-def _o2(s: Scores) -> list[Lazy]:
+def _o2(s: Scores) -> list[ClaimTerm]:
     def values() -> Floats:
         return mean(_gain(s, _others(s, NONE)))
 
     text = "selection minus none, mean over selections and all cells"
-    return [Lazy(text, values), Lazy(f"{text}: several percent", values, "above", SEVERAL)]
+    return [ClaimTerm(text, values), ClaimTerm(f"{text}: several percent", values, "above", SEVERAL)]
 
 
-def _o3(s: Scores) -> list[Lazy]:
+def _o3(s: Scores) -> list[ClaimTerm]:
     return [
-        Lazy("s = 3 minus none, mean over all cells", lambda: mean(_gain(s, [THREE]))),
-        Lazy("s = 3 minus none, in the cell where it gains most", lambda: _highest(_gain(s, [THREE])), "above", 6.0),
+        ClaimTerm("s = 3 minus none, mean over all cells", lambda: mean(_gain(s, [THREE]))),
+        ClaimTerm(
+            "s = 3 minus none, in the cell where it gains most", lambda: _highest(_gain(s, [THREE])), "above", 6.0
+        ),
     ]
 
 
-def _o4(s: Scores) -> list[Lazy]:
+def _o4(s: Scores) -> list[ClaimTerm]:
     def best() -> Floats:
         own, others = _highest(_at_20(s, WITTEN_BELL, FIVE)), s.accuracy.copy()
         there = s.size.index(20), s.smoothing.index(_one_of(s, WITTEN_BELL)), s.select.index(FIVE)
@@ -189,17 +190,17 @@ def _o4(s: Scores) -> list[Lazy]:
         return own - _highest(others)
 
     return [
-        Lazy("s = 5 minus s = 3, mean over all cells", lambda: mean(_gain(s, [FIVE], over=THREE)), "below"),
-        Lazy(
+        ClaimTerm("s = 5 minus s = 3, mean over all cells", lambda: mean(_gain(s, [FIVE], over=THREE)), "below"),
+        ClaimTerm(
             "S = 20, Lidstone: s = 5 minus none, mean over n",
             lambda: mean(_at_20(s, LIDSTONE, FIVE) - _at_20(s, LIDSTONE, NONE)),
             "below",
         ),
-        Lazy("S = 20, Witten-Bell: the best n with s = 5 minus the best of all other cells", best),
+        ClaimTerm("S = 20, Witten-Bell: the best n with s = 5 minus the best of all other cells", best),
     ]
 
 
-def _o5(s: Scores) -> list[Lazy]:
+def _o5(s: Scores) -> list[ClaimTerm]:
     def elsewhere() -> Floats:
         gain = _gain(s, [COMPRESS])
         pairs = [(size, name) for size in s.size for name in s.smoothing]
@@ -210,8 +211,8 @@ def _o5(s: Scores) -> list[Lazy]:
         return average
 
     return [
-        Lazy("compress minus none, mean over all cells but S = 20 with Witten-Bell", elsewhere),
-        Lazy(
+        ClaimTerm("compress minus none, mean over all cells but S = 20 with Witten-Bell", elsewhere),
+        ClaimTerm(
             "S = 20, Witten-Bell: compress minus none, mean over n",
             lambda: mean(_at_20(s, WITTEN_BELL, COMPRESS) - _at_20(s, WITTEN_BELL, NONE)),
             "below",
@@ -220,7 +221,7 @@ def _o5(s: Scores) -> list[Lazy]:
     ]
 
 
-def _o6(s: Scores) -> list[Lazy]:
+def _o6(s: Scores) -> list[ClaimTerm]:
     def gap() -> Floats:
         others = _others(s, UNIQUE)
         best = s.take(select=others).max(axis=2, keepdims=True)
@@ -236,52 +237,56 @@ def _o6(s: Scores) -> list[Lazy]:
         return own - least
 
     return [
-        Lazy("unique minus the best other strategy, in the cell where it is worst", gap, "above", -AMONG),
-        Lazy("spread over n >= 2 with unique minus the smallest of the other strategies", spread, "below"),
+        ClaimTerm("unique minus the best other strategy, in the cell where it is worst", gap, "above", -AMONG),
+        ClaimTerm("spread over n >= 2 with unique minus the smallest of the other strategies", spread, "below"),
     ]
 
 
-def _o7(s: Scores) -> list[Lazy]:
+def _o7(s: Scores) -> list[ClaimTerm]:
     return [
-        Lazy("what selection gains over none, more for each step of n", lambda: _slope(s, _gain(s, _others(s, NONE))))
+        ClaimTerm(
+            "what selection gains over none, more for each step of n", lambda: _slope(s, _gain(s, _others(s, NONE)))
+        )
     ]
 
 
-def _o8(s: Scores) -> list[Lazy]:
+def _o8(s: Scores) -> list[ClaimTerm]:
     def difference() -> Floats:
         one, other = (_one_of(s, family) for family in (WITTEN_BELL, LIDSTONE))
         return s.take(smoothing=[one]) - s.take(smoothing=[other])
 
     return [
-        Lazy("Witten-Bell minus Lidstone, mean over all cells", lambda: mean(difference())),
-        Lazy("Witten-Bell minus Lidstone, more for each step of n", lambda: _slope(s, difference())),
+        ClaimTerm("Witten-Bell minus Lidstone, mean over all cells", lambda: mean(difference())),
+        ClaimTerm("Witten-Bell minus Lidstone, more for each step of n", lambda: _slope(s, difference())),
     ]
 
 
-def _o9(s: Scores) -> list[Lazy]:
-    return [Lazy("n = 2 minus n = 1, mean over all cells", lambda: mean(s.take(order=[2]) - s.take(order=[1])))]
+def _o9(s: Scores) -> list[ClaimTerm]:
+    return [ClaimTerm("n = 2 minus n = 1, mean over all cells", lambda: mean(s.take(order=[2]) - s.take(order=[1])))]
 
 
-def _o10(s: Scores) -> list[Lazy]:
+def _o10(s: Scores) -> list[ClaimTerm]:
     above = [n for n in s.order if n > 2]
 
     def change(select: Sequence[str] | None) -> Floats:
         return mean(s.take(order=above, select=select) - s.take(order=[2], select=select))
 
     return [
-        Lazy("n > 2 minus n = 2, mean over all cells", lambda: change(None), "within", LITTLE),
-        Lazy("without selection: n > 2 minus n = 2, mean over sizes and smoothings", lambda: change([NONE]), "below"),
+        ClaimTerm("n > 2 minus n = 2, mean over all cells", lambda: change(None), "within", LITTLE),
+        ClaimTerm(
+            "without selection: n > 2 minus n = 2, mean over sizes and smoothings", lambda: change([NONE]), "below"
+        ),
     ]
 
 
-def _o11(s: Scores) -> list[Lazy]:
+def _o11(s: Scores) -> list[ClaimTerm]:
     return [
-        Lazy("frames right in the best cell, percent", lambda: _highest(s.accuracy), "above", HIGH),
-        Lazy("the best cell minus always the most frequent place", lambda: _highest(s.accuracy) - s.majority),
+        ClaimTerm("frames right in the best cell, percent", lambda: _highest(s.accuracy), "above", HIGH),
+        ClaimTerm("the best cell minus always the most frequent place", lambda: _highest(s.accuracy) - s.majority),
     ]
 
 
-CLAIMS: tuple[tuple[str, str, Callable[[Scores], list[Lazy]]], ...] = (
+CLAIMS: tuple[tuple[str, str, Callable[[Scores], list[ClaimTerm]]], ...] = (
     ("O1", "A larger map gives better results.", _o1),
     ("O2", "Word selection generally increases the results by several percent.", _o2),
     ("O3", "Subsample with s = 3 is efficient, sometimes by 6 %.", _o3),

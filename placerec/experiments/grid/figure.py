@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from placerec.experiments.grid.config import Config
-from placerec.experiments.grid.results import Row, Way, by_seed, way_of
+from placerec.experiments.grid.results import Row, Setting, by_seed, setting_of
 from placerec.figures import figure_file
 from placerec.figures.panels import place_colours
 
@@ -56,13 +56,13 @@ def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, na
         figure.suptitle(title, fontsize=11)
 
 
-def _bars(axes: "Axes", rows: Sequence[Row], plan: Config, accuracy: Mapping[Way, Sequence[float]]) -> None:
+def _bars(axes: "Axes", rows: Sequence[Row], plan: Config, accuracy: Mapping[Setting, Sequence[float]]) -> None:
     size, smoothing, transition = rows[0].size, rows[0].smoothing, rows[0].transition
     selects, orders = plan.select, sorted(plan.order)
     wide = 0.85 / len(selects)
     colours = place_colours(selects)
     for number, select in enumerate(selects):
-        seeds = [np.array(accuracy[Way(size, smoothing, select, order, transition)]) * 100 for order in orders]
+        seeds = [np.array(accuracy[Setting(size, smoothing, select, order, transition)]) * 100 for order in orders]
         left = np.arange(len(orders)) + wide * (number - (len(selects) - 1) / 2)
         heights, errors = [one.mean() for one in seeds], [one.std(ddof=1) if len(one) > 1 else 0 for one in seeds]
         error: Any = {"elinewidth": 0.8, "capsize": 1.5, "ecolor": "0.2"}
@@ -73,8 +73,8 @@ def _bars(axes: "Axes", rows: Sequence[Row], plan: Config, accuracy: Mapping[Way
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _lines(axes: "Axes", rows: Sequence[Row], baselines: Mapping[str, Mapping[Way, Sequence[float]]]) -> None:
-    ways = {way_of(row) for row in rows}
+def _lines(axes: "Axes", rows: Sequence[Row], baselines: Mapping[str, Mapping[Setting, Sequence[float]]]) -> None:
+    settings = {setting_of(row) for row in rows}
     for kind, label, style in _BASELINES:
-        height = 100 * float(np.mean([np.mean(baselines[kind][way]) for way in sorted(ways)]))
+        height = 100 * float(np.mean([np.mean(baselines[kind][setting]) for setting in sorted(settings)]))
         axes.axhline(height, linestyle=style, color="black", linewidth=1.1, label=label)

@@ -3,20 +3,20 @@
 import platform
 import shlex
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from os.path import relpath
 from pathlib import Path
 
 from placerec.errors import ExperimentError
 from placerec.evaluation import Evaluation, evaluate
-from placerec.experiments.grid import cache
-from placerec.experiments.grid.cells import Cell, believe_cell
+from placerec.experiments.grid.cells import GridCell, believe_cell
 from placerec.experiments.grid.claims import judge
-from placerec.experiments.grid.commands import commands_of
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_figure
-from placerec.experiments.grid.results import Results, Way
+from placerec.experiments.grid.jobs import GridJob
+from placerec.experiments.grid.results import Results, Setting
 from placerec.experiments.grid.tables import (
     Table,
     best_table,
@@ -29,8 +29,7 @@ from placerec.experiments.grid.tables import (
     runs_table,
     verdicts_table,
 )
-from placerec.experiments.grid.tokens import draw_words
-from placerec.experiments.grid.units import Unit
+from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.figures import (
     belief_strip,
     confusion_panel,
@@ -44,38 +43,41 @@ from placerec.figures import (
     table,
 )
 from placerec.figures.panels import strip_title
-from placerec.files import read_text, write_text
+from placerec.files import content_digest_of_file, read_text, write_text
 from placerec.hohmm import Beliefs
+from placerec.inspection.word_sheet import draw_word_sheet
+from placerec.inspection.words import typical_images, word_table
 from placerec.version import __version__
+from placerec.vision import Descriptors, Dictionary
 
 _PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib")
 
 
-def write_reports(results: Results, plan: Config, config: Path, units: Sequence[Unit], out: Path) -> None:
+def write_reports(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob], out: Path) -> None:
     """Write figure.png and figure.svg, tables.md, claims.md and report.html into `out`, unless they are there already.
 
     With more than one kind of transitions the first of the config has the figure, others figure-NAME. Raises
     MissingExtraError without matplotlib.
     """
-    record, key = out / "cache" / "report.json", _key(config, units, out)
-    if cache.load(record) != {"key": key, "files": _contents(out)}:
-        _write(results, plan, config, units, out)
-        cache.save(record, {"key": key, "files": _contents(out)})
+    record, key = out / "cache" / "report.json", _key(config, jobs, out)
+    if load(record) != {"key": key, "files": _contents(out)}:
+        _write(results, plan, config, jobs, out)
+        save(record, {"key": key, "files": _contents(out)})
 
 
-def _key(config: Path, units: Sequence[Unit], out: Path) -> str:
+def _key(config: Path, jobs: Sequence[GridJob], out: Path) -> str:
     """What all that is written here depends on."""
-    rows = [cache.content_of(out / name) for name in ("results.csv", "sequences.csv")]
-    made_of = [(unit.job.kept.name, unit.images.folder.name if unit.images else "") for unit in units]
-    return cache.key_of("report", rows, made_of, str(config), read_text(config, ExperimentError), str(out), _versions())
+    rows = [content_digest_of_file(out / name, ExperimentError) for name in ("results.csv", "sequences.csv")]
+    made_of = [(job.work.kept.name, job.images.folder.name if job.images else "") for job in jobs]
+    return key_of("report", rows, made_of, str(config), read_text(config, ExperimentError), str(out), _versions())
 
 
 def _contents(out: Path) -> dict[str, str]:
     paths = sorted(path for pattern in ("*.md", "*.html", "figure*") for path in out.glob(pattern))
-    return {path.name: cache.content_of(path) for path in paths}
+    return {path.name: content_digest_of_file(path, ExperimentError) for path in paths}
 
 
-def _write(results: Results, plan: Config, config: Path, units: Sequence[Unit], out: Path) -> None:
+def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob], out: Path) -> None:
     note = reading(len({name for row in results.rows for name in row.sequences}), plan.seeds)
     claims = {transition: judge(results, transition) for transition in plan.transition}
     write_text(out / "tables.md", format_tables(results))
@@ -95,13 +97,13 @@ def _write(results: Results, plan: Config, config: Path, units: Sequence[Unit], 
         heading("The data"),
         _table(images_table(results.folds), "Labelled images per place and split."),
         _table(runs_table(results.rows), "Frames in a row with the same word, in training."),
-        *_closer_look(results, units),
+        *_closer_look(results, jobs),
         heading("Do it again"),
         preformatted(f"placerec experiment {shlex.quote(config.name)} -o {shlex.quote(out.resolve().name)}/"),
         paragraph(f"{config.name}:"),
         preformatted(read_text(config, ExperimentError)),
         paragraph(f"The best way of the grid, step by step ({ranked(results)[0]}; seed 0):"),
-        preformatted(commands_of(plan, ranked(results)[0], _of(units, ranked(results)[0])[0])),
+        preformatted(commands_of(plan, ranked(results)[0], _of(jobs, ranked(results)[0])[0])),
         preformatted(_versions()),
     ]
     write_text(out / "report.html", html_page(f"placerec experiment: {config.stem}", body))
@@ -143,45 +145,45 @@ def _table(content: Table, caption: str) -> str:
 
 @dataclass(frozen=True)
 class _Look:
-    """A way with seed 0, its beliefs over the test sequences of all folds, and their evaluation."""
+    """A setting with seed 0, its beliefs over the test sequences of all folds, and their evaluation."""
 
-    way: Way
+    setting: Setting
     beliefs: list[Beliefs]
     evaluation: Evaluation
 
 
-def _of(units: Sequence[Unit], way: Way) -> list[Unit]:
-    """The units of a way with seed 0, one per fold."""
-    return [unit for unit in units if (unit.size, unit.seed, unit.job.select) == (way.size, 0, way.select)]
+def _of(jobs: Sequence[GridJob], setting: Setting) -> list[GridJob]:
+    """The jobs of a setting with seed 0, one per fold."""
+    return [job for job in jobs if (job.size, job.seed, job.work.select) == (setting.size, 0, setting.select)]
 
 
-def _look(units: Sequence[Unit], way: Way) -> _Look:
-    cell = Cell(way.smoothing, way.order, way.transition)
-    beliefs = [one for unit in _of(units, way) for one in believe_cell(unit.job, cell)]
-    return _Look(way, beliefs, evaluate(beliefs))
+def _look(jobs: Sequence[GridJob], setting: Setting) -> _Look:
+    cell = GridCell(setting.smoothing, setting.order, setting.transition)
+    beliefs = [one for job in _of(jobs, setting) for one in believe_cell(job.work, cell)]
+    return _Look(setting, beliefs, evaluate(beliefs))
 
 
-def _closer_look(results: Results, units: Sequence[Unit]) -> Iterator[str]:
-    """Belief strips and confusion matrices of the best way, and its words."""
-    best = _look(units, ranked(results)[0])
-    first = best.way._replace(order=min(row.order for row in results.rows))
-    looks = [best] if first == best.way else [best, _look(units, first)]
+def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
+    """Belief strips and confusion matrices of the best setting, and its words."""
+    best = _look(jobs, ranked(results)[0])
+    first = best.setting._replace(order=min(row.order for row in results.rows))
+    looks = [best] if first == best.setting else [best, _look(jobs, first)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         yield heading("Belief over time")
-        caption = f"The sequences with the most and the fewest frames right: {best.way}, seed 0."
+        caption = f"The sequences with the most and the fewest frames right: {best.setting}, seed 0."
         strips = _strips(best, folder / "strips.png", 11)
         narrow = _strips(best, folder / "narrow.png", 5)
         yield picture(strips, "Beliefs of two test sequences", caption, narrow=narrow)
         yield heading("What is confused")
         for number, look in enumerate(looks):
             path = folder / f"confusion{number}.png"
-            yield picture(_confusion(look, path), "Confusion matrix", f"{look.way}, seed 0, all folds.")
-        images = _of(units, best.way)[0].images
+            yield picture(_confusion(look, path), "Confusion matrix", f"{look.setting}, seed 0, all folds.")
+        images = _of(jobs, best.setting)[0].images
         if images is not None:
             yield heading("The words")
-            draw_words(images, folder / "words.png")
-            caption = f"The words of S = {best.way.size}, seed 0, among the test frames of the first fold."
+            _draw_words(images, folder / "words.png")
+            caption = f"The words of S = {best.setting.size}, seed 0, among the test frames of the first fold."
             yield picture(folder / "words.png", "For each word a typical frame", caption)
 
 
@@ -211,6 +213,14 @@ def _confusion(look: _Look, path: Path) -> Path:
     return path
 
 
+def _draw_words(job: WordsJob, path: Path) -> None:
+    """Draw what the words look like among the test frames, as `placerec show-words` does."""
+    sequences = [one.sequence for one in job.test]
+    words = word_table(Descriptors.concat([one.load() for one in job.test]), Dictionary.load(job.words))
+    title = f"The words of S = {job.size}, seed {job.seed}, among the test frames"
+    draw_word_sheet(words, typical_images(words, sequences), path, title=title)
+
+
 def _versions() -> str:
     lines = [
         f"placerec {__version__}",
@@ -222,3 +232,38 @@ def _versions() -> str:
         except PackageNotFoundError:
             lines.append(f"{package}: not known")
     return "\n".join(lines)
+
+
+def commands_of(plan: Config, setting: Setting, job: GridJob) -> str:
+    """The commands that make a setting's result on the fold of `job`, run in the folder of the config."""
+    lines = []
+    tokens = "tokens"
+    if job.images is not None:
+        sources = [[_from(plan, one.sequence.source) for one in part] for part in (job.images.train, job.images.test)]
+        words = f"-o words.npz --size {setting.size} --seed {job.seed} --units {plan.units}"
+        lines += [
+            f"placerec train-words {_listed(sources[0])} {words}",
+            f"placerec tokenize {_listed(sources[0] + sources[1])} -w words.npz -o {tokens}/",
+        ]
+    else:
+        tokens = _from(plan, job.work.train[0].parent)
+    train, test = (_listed(f"{tokens}/{path.name}" for path in paths) for paths in (job.work.train, job.work.test))
+    model = f"--order {setting.order} --smoothing {setting.smoothing} --select {setting.select}"
+    learned = setting.transition == "learned"
+    steps = "--transition learned" if learned else f"--stay {plan.stay:g} --per {plan.per}"
+    lines += [
+        f"placerec train-lm {train} -o model/ {model}",
+        f"placerec decode {test} -m model/ -o beliefs/ {steps}",
+        "placerec evaluate beliefs/",
+    ]
+    return "\n".join(lines)
+
+
+def _from(plan: Config, path: Path) -> str:
+    """The path as seen from the config's folder, if it is below it."""
+    found = relpath(path, plan.folder)
+    return str(path) if found.startswith("..") else found
+
+
+def _listed(paths: Iterable[str]) -> str:
+    return " ".join(map(shlex.quote, paths))

@@ -2,6 +2,10 @@
 
 results.csv    the columns of `COLUMNS`, sorted by the first seven
 sequences.csv  how many frames of each test sequence were right: what the intervals are computed from
+
+`Scores` are the accuracies over all frames, and what they would be with other test sequences. Frames of one sequence
+resemble each other, so sequences are drawn, with replacement, and all of their frames with them. Every cell sees the
+same draws: a difference between two cells is one between the same sequences and seeds.
 """
 
 import csv
@@ -11,6 +15,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
+from placerec.arrays import Floats
+from placerec.evaluation.bootstrap import DRAWS, draw
 from placerec.files import write_text
 
 COLUMNS = (
@@ -63,7 +71,7 @@ class Row:
         return sum(one.frame_wise for one in self.sequences.values()) / self.frames
 
 
-class Way(NamedTuple):
+class Setting(NamedTuple):
     """How models are made and used: a row without its seed and fold."""
 
     size: int
@@ -76,9 +84,9 @@ class Way(NamedTuple):
         return f"S = {self.size}, {self.smoothing}, {self.select}, n = {self.order}, {self.transition} transitions"
 
 
-def way_of(row: Row) -> Way:
-    """The way of a row."""
-    return Way(row.size, row.smoothing, row.select, row.order, row.transition)
+def setting_of(row: Row) -> Setting:
+    """The setting of a row."""
+    return Setting(row.size, row.smoothing, row.select, row.order, row.transition)
 
 
 @dataclass(frozen=True)
@@ -99,14 +107,14 @@ class Results:
 
 def by_seed(
     rows: Iterable[Row], share: Callable[[SequenceCount], int] = lambda one: one.right
-) -> dict[Way, list[float]]:
-    """Per way, the share of the frames of all folds that are right, from 0 to 1: one number a seed."""
-    counts: dict[Way, dict[int, list[int]]] = {}
+) -> dict[Setting, list[float]]:
+    """Per setting, the share of the frames of all folds that are right, from 0 to 1: one number a seed."""
+    counts: dict[Setting, dict[int, list[int]]] = {}
     for row in rows:
-        total = counts.setdefault(way_of(row), {}).setdefault(row.seed, [0, 0])
+        total = counts.setdefault(setting_of(row), {}).setdefault(row.seed, [0, 0])
         total[0] += sum(map(share, row.sequences.values()))
         total[1] += row.frames
-    return {way: [right / frames for right, frames in seeds.values()] for way, seeds in counts.items()}
+    return {setting: [right / frames for right, frames in seeds.values()] for setting, seeds in counts.items()}
 
 
 def write_results(results: Results, out: Path) -> None:
@@ -131,3 +139,93 @@ def _csv(header: str, rows: Iterable[Sequence[object]]) -> str:
     writer.writerow(header.split(","))
     writer.writerows(rows)
     return text.getvalue()
+
+
+class MissingCellsError(Exception):
+    """The grid lacks what is asked of it; the message says what."""
+
+
+@dataclass(frozen=True)
+class Scores:
+    """The cells of one kind of transition; `accuracy` float64 (sizes, smoothings, selects, orders, 1 + DRAWS).
+
+    Percent of the frames of all folds, mean over seeds. The first number of the last axis is the real one, the others
+    are those of the draws. `majority` float64 (1 + DRAWS,): of always the most frequent place of the fold.
+    """
+
+    size: tuple[int, ...]
+    smoothing: tuple[str, ...]
+    select: tuple[str, ...]
+    order: tuple[int, ...]
+    sequences: tuple[str, ...]
+    accuracy: Floats = field(repr=False)
+    majority: Floats = field(repr=False)
+
+    def take(
+        self,
+        *,
+        size: Sequence[int] | None = None,
+        smoothing: Sequence[str] | None = None,
+        select: Sequence[str] | None = None,
+        order: Sequence[int] | None = None,
+    ) -> Floats:
+        """The accuracies of some cells, all axes kept; MissingCellsError for a value that the grid does not have."""
+        taken = self.accuracy
+        for axis, (name, wanted) in enumerate(
+            (("size", size), ("smoothing", smoothing), ("select", select), ("order", order))
+        ):
+            if wanted is not None:
+                has: tuple[int | str, ...] = getattr(self, name)
+                for value in wanted:
+                    if value not in has:
+                        raise MissingCellsError(f"the grid has no {name} {value}")
+                if not wanted:
+                    raise MissingCellsError(f"the grid has no {name} for it")
+                taken = taken.take([has.index(value) for value in wanted], axis=axis)
+        return taken
+
+
+def mean(cells: Floats) -> Floats:
+    """The mean over cells: (a, b, c, d, n) to (n,)."""
+    average: Floats = cells.mean(axis=(0, 1, 2, 3))
+    return average
+
+
+def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
+    """The accuracies of all cells in rows of one kind of transition, really and in draws of the test sequences."""
+    size, smoothing, select, order = axes = tuple(
+        tuple(sorted({getattr(row, name) for row in rows})) for name in ("size", "smoothing", "select", "order")
+    )
+    names = tuple(sorted({name for row in rows for name in row.sequences}))
+    right = np.zeros((*map(len, axes), len(names)))
+    place = [{value: i for i, value in enumerate(axis)} for axis in axes]
+    number = {name: i for i, name in enumerate(names)}
+    frames, majority = np.zeros(len(names)), np.zeros(len(names))
+    seeds = len({row.seed for row in rows})
+    for row in rows:
+        cell = tuple(of[value] for of, value in zip(place, _key(row), strict=True))
+        for name, one in row.sequences.items():
+            right[(*cell, number[name])] += one.right / seeds
+            frames[number[name]], majority[number[name]] = one.frames, one.majority
+    weights = drawn(len(names), draws)
+    whole = weights @ frames
+    with np.errstate(invalid="ignore", divide="ignore"):
+        accuracy = 100 * np.einsum("abcds,ns->abcdn", right, weights) / whole
+        return Scores(
+            size,
+            smoothing,
+            select,
+            order,
+            names,
+            np.nan_to_num(accuracy),
+            np.nan_to_num(100 * (weights @ majority) / whole),
+        )
+
+
+def drawn(sequences: int, draws: int) -> Floats:
+    """How often each sequence is there, float64 (1 + draws, sequences): once each, then as a fixed seed draws them."""
+    return np.concatenate([np.ones((1, sequences)), draw(sequences, 0, draws).astype(np.float64)])
+
+
+def _key(row: Row) -> tuple[int | str, ...]:
+    return row.size, row.smoothing, row.select, row.order

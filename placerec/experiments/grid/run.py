@@ -1,31 +1,23 @@
 """The whole experiment: images or token streams in, a folder of results out."""
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from placerec.errors import OutputError
-from placerec.experiments.grid import cache
-from placerec.experiments.grid.cells import Cell, run_cells
+from placerec.experiments.grid.cells import GridCell, run_cells
 from placerec.experiments.grid.config import Config, read_config
+from placerec.experiments.grid.jobs import GridJob, find_jobs
 from placerec.experiments.grid.report import write_reports
 from placerec.experiments.grid.results import FoldData, Results, Row, SequenceCount, write_results
-from placerec.experiments.grid.units import ProgressBar, Unit, find_units
+from placerec.experiments.store import held_output
 from placerec.figures.panels import check_figure
-from placerec.files import held_folder
-from placerec.jobs import map_jobs
+from placerec.jobs import ProgressBar, map_jobs, silent
 
 log = logging.getLogger(__name__)
 
 
-@contextmanager
-def _silence(label: str) -> Iterator[Callable[[int, int], None]]:
-    yield lambda done, total: None
-
-
-def experiment(config: Path | str, out: Path | str, *, jobs: int = 1, progress: ProgressBar = _silence) -> Results:
+def experiment(config: Path | str, out: Path | str, *, jobs: int = 1, progress: ProgressBar = silent) -> Results:
     """`placerec experiment`: run the grid of a TOML file (`read_config`) and write all that is known to `out`.
 
     What `out`/cache holds from runs before is used again; the results are the same for any number of `jobs`
@@ -36,44 +28,32 @@ def experiment(config: Path | str, out: Path | str, *, jobs: int = 1, progress: 
     out = Path(out)
     check_figure(out / "figure.png")
     plan = read_config(config)
-    with _at_work(out):
-        units, results = run_grid(plan, out, jobs=jobs, progress=progress)
-        write_reports(results, plan, Path(config), units, out)
+    with held_output(out):
+        todo, results = run_grid(plan, out, jobs=jobs, progress=progress)
+        write_reports(results, plan, Path(config), todo, out)
     return results
 
 
-def run_grid(plan: Config, out: Path, *, jobs: int = 1, progress: ProgressBar = _silence) -> tuple[list[Unit], Results]:
-    """The units of a config and the rows of all their cells, which are written to `out`."""
-    units = find_units(plan, out, jobs=jobs, progress=progress)
-    log.info("%d cells", sum(len(unit.job.cells) for unit in units))
+def run_grid(
+    plan: Config, out: Path, *, jobs: int = 1, progress: ProgressBar = silent
+) -> tuple[list[GridJob], Results]:
+    """The jobs of a config and the rows of all their cells, which are written to `out`."""
+    todo = find_jobs(plan, out, jobs=jobs, progress=progress)
+    log.info("%d cells", sum(len(job.work.cells) for job in todo))
     with progress("recognise") as show:
-        found = map_jobs(run_cells, [unit.job for unit in units], jobs=jobs, progress=show)
-    results = collect(units, found)
+        found = map_jobs(run_cells, [job.work for job in todo], jobs=jobs, progress=show)
+    results = collect(todo, found)
     write_results(results, out)
-    return units, results
+    return todo, results
 
 
-@contextmanager
-def _at_work(out: Path) -> Iterator[None]:
-    """Keep other runs out of the folder, and clear away what a killed one left."""
-    folders = [out, *(out / "cache" / name for name in ("descriptors", "words", "tokens", "cells"))]
-    try:
-        for folder in folders:
-            folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{error.filename}: cannot be written: {error.strerror}") from error
-    with held_folder(out):
-        cache.sweep(folders)
-        yield
-
-
-def collect(units: Sequence[Unit], found: Sequence[Mapping[str, Any]]) -> Results:
+def collect(jobs: Sequence[GridJob], found: Sequence[Mapping[str, Any]]) -> Results:
     """The rows of all cells, sorted, and what the folds hold."""
     rows: list[Row] = []
     folds: dict[str, FoldData] = {}
-    for unit, results in zip(units, found, strict=True):
-        folds[unit.fold.name] = FoldData(results["data"]["train"], results["data"]["test"])
-        rows += [_row(unit, cell, results) for cell in unit.job.cells]
+    for job, results in zip(jobs, found, strict=True):
+        folds[job.fold.name] = FoldData(results["data"]["train"], results["data"]["test"])
+        rows += [_row(job, cell, results) for cell in job.work.cells]
     return Results(sorted(rows, key=_place_in_file), folds)
 
 
@@ -81,15 +61,15 @@ def _place_in_file(row: Row) -> tuple[int | str, ...]:
     return row.size, row.seed, row.fold, row.smoothing, row.select, row.order, row.transition
 
 
-def _row(unit: Unit, cell: Cell, results: Mapping[str, Any]) -> Row:
-    found = results[unit.job.name(cell)]
+def _row(job: GridJob, cell: GridCell, results: Mapping[str, Any]) -> Row:
+    found = results[job.work.name(cell)]
     frame_wise, data = results[f"frame-wise {cell.smoothing}"], results["data"]
     labels = found["majority"]
     return Row(
-        size=unit.size,
-        seed=unit.seed,
-        fold=unit.fold.name,
-        select=unit.job.select,
+        size=job.size,
+        seed=job.seed,
+        fold=job.fold.name,
+        select=job.work.select,
         same_word_run=data["same_word_run"],
         sequences={
             name: SequenceCount(frames, right, frame_wise[name], labels[name], late)

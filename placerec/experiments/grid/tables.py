@@ -6,7 +6,7 @@ import numpy as np
 
 from placerec.evaluation.bootstrap import DRAWS, LEAST
 from placerec.experiments.grid.claims import HIGH, Claim, Statement
-from placerec.experiments.grid.results import FoldData, Results, Row, Way, by_seed
+from placerec.experiments.grid.results import FoldData, Results, Row, Setting, by_seed
 
 PAPER_RUNS = {10: 3.15, 20: 2.67}
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
@@ -34,24 +34,24 @@ def runs_table(rows: Iterable[Row]) -> Table:
 
 
 def best_table(results: Results, most: int = 10) -> Table:
-    """The best ways, and the baselines beside each: percent of the frames, mean and standard deviation over seeds."""
+    """The best settings, with baselines: percent of the frames, mean and standard deviation over seeds."""
     tables = [
         by_seed(results.rows, share) for share in (lambda o: o.right, lambda o: o.frame_wise, lambda o: o.majority)
     ]
     lines = []
-    for way in ranked(results)[:most]:
-        right, alone, majority = (100 * np.array(table[way]) for table in tables)
+    for setting in ranked(results)[:most]:
+        right, alone, majority = (100 * np.array(table[setting]) for table in tables)
         spread = f" ± {right.std(ddof=1):.1f}" if len(right) > 1 else ""
-        names = str(way.size), way.smoothing, way.select, str(way.order), way.transition
+        names = str(setting.size), setting.smoothing, setting.select, str(setting.order), setting.transition
         lines.append((*names, f"{right.mean():.1f}{spread}", f"{alone.mean():.1f}", f"{majority.mean():.1f}"))
     names_ = ("S", "smoothing", "select", "n", "transition")
     return (*names_, "frames right, %", "each frame alone, %", "most frequent place, %"), lines
 
 
-def ranked(results: Results) -> list[Way]:
-    """All ways, the best first by the mean over seeds; of equals the first in order."""
+def ranked(results: Results) -> list[Setting]:
+    """All settings, the best first by the mean over seeds; of equals the first in order."""
     accuracy = by_seed(results.rows)
-    return sorted(accuracy, key=lambda way: (-np.mean(accuracy[way]), way))
+    return sorted(accuracy, key=lambda setting: (-np.mean(accuracy[setting]), setting))
 
 
 def verdicts_table(claims: Mapping[str, Sequence[Claim]]) -> Table:

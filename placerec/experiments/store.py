@@ -1,0 +1,220 @@
+"""What experiments keep from one run to the next: descriptors, dictionaries, token streams and results.
+
+A file is named by a digest of all inputs and options that it was made of, of FORMAT and of placerec's version: whatever
+changes, only what depends on it is made again. Each file is there whole or not at all; any of them may be removed.
+
+descriptors/KEY.npz  of one sequence
+words/KEY.npz        a dictionary
+tokens/KEY/          token streams of several sequences
+NAME/KEY.json        plain values: results of a grid's cells, times
+models/KEY/          n-gram models of a comparison
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from placerec.errors import ExperimentError, OutputError, PlacerecError, VisionError
+from placerec.files import content_digest, content_digest_of_file, held_folder, read_text, write_text
+from placerec.frames import Sequence as FrameSequence
+from placerec.frames import files_of
+from placerec.frames.table import FrameTable
+from placerec.jobs import Executor, Progress
+from placerec.version import __version__
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe
+from placerec.vision.storage import read_npz, write_npz
+from placerec.words import WordStream
+from placerec.words.tokenize import tokens_of, write_tokens
+
+FORMAT = "placerec experiments 3"
+# Frames that are described before their descriptors are written: enough to keep many processors at work.
+TOGETHER = 2000
+
+
+def key_of(*parts: object) -> str:
+    """What a result is kept under that depends on these parts (bytes, or plain values): 64 hexadecimal digits."""
+    return content_digest(FORMAT, __version__, *parts)
+
+
+def load(path: Path) -> dict[str, Any]:
+    """The plain values that `save` wrote to a file, empty if there is none or it cannot be read."""
+    try:
+        content = json.loads(read_text(path, PlacerecError))
+    except (PlacerecError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def save(path: Path, content: dict[str, Any]) -> None:
+    """Keep plain values; numbers come back to the last digit."""
+    write_text(path, json.dumps(content, ensure_ascii=True, separators=(",", ":")) + "\n")
+
+
+@contextmanager
+def held_output(out: Path) -> Iterator[None]:
+    """Make the folder of a run if need be, keep other runs out of it, and clear away files that a killed one left.
+
+    Raises OutputError if the folder cannot be written or another run is at work there.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{out}: cannot be written: {error.strerror or error}") from error
+    with held_folder(out):
+        for folder in (out, *(out / "cache").glob("*/")):
+            for path in folder.glob(".*.partial-*"):
+                if path.is_file():
+                    path.unlink(missing_ok=True)
+        yield
+
+
+@dataclass(frozen=True)
+class Described:
+    """A sequence whose descriptors are in the file `kept`, which is named by a digest of images and descriptor."""
+
+    sequence: FrameSequence
+    spec: DescriptorSpec
+    kept: Path
+
+    @property
+    def key(self) -> str:
+        """The digest."""
+        return self.kept.stem
+
+    def load(self) -> Descriptors:
+        """The descriptors of the frames that could be read, with the times and labels that the sequence has now."""
+        arrays, _ = read_npz(self.kept, ("descriptors", "rows"))
+        frames = [self.sequence.frames[row] for row in arrays["rows"].tolist()]
+        table = FrameTable.of_frames(self.sequence.name, frames)
+        return Descriptors(self.spec, arrays["descriptors"], table, len(self.sequence.frames) - len(frames))
+
+
+def describe_all(
+    sequences: Sequence[FrameSequence],
+    spec: DescriptorSpec,
+    cache: Path,
+    *,
+    work: Executor | None = None,
+    progress: Progress | None = None,
+) -> list[Described]:
+    """Describe the frames of all sequences whose descriptors are not in the folder `cache` yet.
+
+    `work`: who does the work (`jobs.workers`), None for threads. `progress` is called with frames done and in all.
+    Raises ExperimentError for a file that cannot be read and for a sequence without a readable image.
+    """
+    folder = cache / "descriptors"
+    described = [Described(one, spec, folder / f"{_key(one, spec)}.npz") for one in sequences]
+    missing = [one for one in described if not _usable(one)]
+    total = sum(len(one.sequence.frames) for one in described)
+    done = total - sum(len(one.sequence.frames) for one in missing)
+    if progress and done:
+        progress(done, total)
+    for some in _batches(missing):
+        shown = (lambda n, _, start=done: progress(start + n, total)) if progress else None
+        _describe(some, spec, work, shown)
+        done += sum(len(one.sequence.frames) for one in some)
+    return described
+
+
+def _key(sequence: FrameSequence, spec: DescriptorSpec) -> str:
+    """A digest of a sequence's images; labels, times and names may change without them."""
+    how = sequence.recording and repr(sequence.recording)
+    files = [content_digest_of_file(path, ExperimentError) for path in files_of(sequence)]
+    return key_of("descriptors", spec.as_dict(), how, files)
+
+
+def _usable(one: Described) -> bool:
+    try:
+        one.load()
+    except (VisionError, KeyError, IndexError):
+        return False
+    return True
+
+
+def _batches(missing: Sequence[Described]) -> Iterator[list[Described]]:
+    some: list[Described] = []
+    for one in missing:
+        some.append(one)
+        if sum(len(each.sequence.frames) for each in some) >= TOGETHER:
+            yield some
+            some = []
+    if some:
+        yield some
+
+
+def _describe(
+    some: Sequence[Described], spec: DescriptorSpec, work: Executor | None, progress: Progress | None
+) -> None:
+    found = describe([one.sequence for one in some], spec, work=work, progress=progress)
+    rows = found.table.by_sequence()
+    for one in some:
+        if one.sequence.name not in rows:
+            raise ExperimentError(f"{one.sequence.source}: none of its images can be read; leave the sequence out")
+        own = found.take(rows[one.sequence.name])
+        # Equal names in one sequence cannot be.
+        number = {frame.name: k for k, frame in enumerate(one.sequence.frames)}
+        kept = np.array([number[name] for name in own.table.names], np.int64)
+        write_npz(one.kept, {"descriptors": own.values, "rows": kept}, {})
+
+
+@dataclass(frozen=True)
+class WordsJob:
+    """The words of one map, learned on the sequences `train`, and the token streams of these and of `test`.
+
+    `size`, `seed`, `units`: see `Dictionary.fit`. `cache`: the folder where all of it is kept.
+    """
+
+    train: tuple[Described, ...]
+    test: tuple[Described, ...]
+    size: int
+    seed: int
+    units: str
+    cache: Path
+
+    @property
+    def words(self) -> Path:
+        """The dictionary's file."""
+        made_of = ([one.key for one in self.train], self.size, self.seed, self.units)
+        return self.cache / "words" / f"{key_of('words', *made_of)}.npz"
+
+    @property
+    def folder(self) -> Path:
+        """The token streams' folder."""
+        labels = [
+            (one.sequence.name, one.key, [(f.name, repr(f.time), f.place) for f in one.sequence.frames])
+            for one in (*self.train, *self.test)
+        ]
+        return self.cache / "tokens" / key_of("tokens", self.words.stem, labels)
+
+    @property
+    def made(self) -> bool:
+        """Whether all that `make_tokens` writes is there."""
+        names = [f"{one.sequence.name}.tsv" for one in (*self.train, *self.test)]
+        folder = self.folder
+        return self.words.exists() and all((folder / name).exists() for name in (*names, "vocab.txt"))
+
+    def dictionary(self) -> Dictionary:
+        """The dictionary, which is learned and kept if there is none yet."""
+        try:
+            return Dictionary.load(self.words)
+        except VisionError:
+            values = np.concatenate([one.load().values for one in self.train])
+            spec = self.train[0].spec
+            Dictionary.fit(values, spec=spec, size=self.size, seed=self.seed, units=self.units).save(self.words)
+        return Dictionary.load(self.words)
+
+
+def streams_of(described: Sequence[Described], dictionary: Dictionary) -> list[WordStream]:
+    """The token streams of some sequences, in their order."""
+    return [stream for one in described for stream in tokens_of(one.load(), dictionary)]
+
+
+def make_tokens(job: WordsJob) -> None:
+    """Learn the words and write the token streams, as `placerec train-words` and `placerec tokenize` do."""
+    dictionary = job.dictionary()
+    write_tokens(streams_of((*job.train, *job.test), dictionary), dictionary, job.folder)
