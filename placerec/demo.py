@@ -1,7 +1,7 @@
 """The demonstration: the synthetic laboratory from images to a page to look at."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -11,10 +11,10 @@ import numpy as np
 from placerec.errors import check_optional
 from placerec.evaluation import Evaluation, evaluate
 from placerec.figures import heading, html_page, paragraph, picture, plot_evaluation, preformatted, table
-from placerec.figures.sheet import contact_sheet
+from placerec.figures.canvas import figure_file
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence
-from placerec.frames import find_sequences
+from placerec.frames import find_sequences, read_gray
 from placerec.hohmm import Beliefs, write_beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import WordTable, typical_images, word_sentences, word_table
@@ -70,7 +70,7 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
                 beliefs = _recognise(folder, smoothing, order)
                 results.append(DemoResult(smoothing, order, evaluate(beliefs)))
                 best = beliefs if (smoothing, order) == ("witten-bell", 2) else best
-        contact_sheet(_typical_frames(sequences), folder / "laboratory.png")
+        _contact_sheet(_typical_frames(sequences), folder / "laboratory.png")
         words = word_table(descriptors.take(~training), dictionary)
         draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title="The words of run 3")
         plot_evaluation(best, evaluate(best), folder / "beliefs.png")
@@ -126,6 +126,26 @@ def _typical_frames(sequences: Sequence[FrameSequence]) -> dict[str, dict[str, P
                 frames = [frame for frame in sequence.frames if frame.place == place]
                 sheet.setdefault(light, {})[place] = frames[len(frames) // 10].path
     return sheet
+
+
+def _contact_sheet(images: Mapping[str, Mapping[str, Path]], path: Path) -> None:
+    """Draw the images, row title -> column title -> image file, as one picture.
+
+    Raises MissingExtraError without matplotlib, SourceError for an image that cannot be read.
+    """
+    columns = sorted({column for row in images.values() for column in row})
+    with figure_file(path, width=2.1 * len(columns) + 0.3, height=1.6 * len(images) + 0.3) as figure:
+        figure.set_layout_engine("compressed")
+        grid = figure.subplots(len(images), len(columns), squeeze=False)
+        for (row, pictures), axes_row in zip(images.items(), grid, strict=True):
+            for column, axes in zip(columns, axes_row, strict=True):
+                axes.set_xticks([])
+                axes.set_yticks([])
+                if column in pictures:
+                    axes.imshow(read_gray(pictures[column]), cmap="gray", vmin=0, vmax=255)
+            axes_row[0].set_ylabel(row)
+        for column, axes in zip(columns, grid[0], strict=True):
+            axes.set_title(column)
 
 
 def _report(folder: Path, results: Sequence[DemoResult], words: WordTable, frames: int, commands: str) -> str:

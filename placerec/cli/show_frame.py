@@ -39,7 +39,7 @@ def show_frame(
     what these units look like, and which place they mostly belong to, among the frames there.
     """
     from placerec.inspection.frame import format_frame
-    from placerec.inspection.show import show_frame as run
+    from placerec.inspection.frame import show_frame as run
 
     with progress_bar("describe") as progress:
         view = run(image, words, sources, out, reading=reading, progress=progress)

@@ -41,7 +41,7 @@ def show_words(
     the sheet shows the frame nearest to it, the place that most frames with this word have, and the training frames
     that hit it; and how far neighbouring units are from each other (U-matrix).
     """
-    from placerec.inspection.show import show_words as run
+    from placerec.inspection.word_sheet import show_words as run
     from placerec.inspection.words import format_words
 
     with progress_bar("describe") as progress:

@@ -35,8 +35,8 @@ def stability(
     pixel and another resize filter; told is the share of frames that get another word, and how many of these words
     are next to the right one on the map.
     """
-    from placerec.inspection.show import stability as run
     from placerec.inspection.word_stability import format_stability
+    from placerec.inspection.word_stability import stability as run
 
     with progress_bar("stability") as progress:
         found = run(sources, words, out, reading=reading, seed=seed, progress=progress)

@@ -1,28 +1,59 @@
-"""One picture of an evaluation: every sequence's beliefs under its true places, what was confused, and how surely."""
+"""Beliefs files to an evaluation, and its picture: beliefs under the true places, what was confused, how surely."""
 
-from collections.abc import Sequence
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from placerec.evaluation.metrics import Evaluation
+from placerec.errors import EvaluationError
+from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.evaluation.summary import percent, shorten
-from placerec.figures.curves import coverage_panel, reliability_panel, roc_panel
-from placerec.figures.panels import belief_strip, confusion_panel, figure_file, legend_panel, strip_title
-from placerec.hohmm.beliefs import Beliefs
+from placerec.figures.canvas import MARGIN, check_figure, figure_file, panel, write_line
+from placerec.figures.panels import (
+    belief_strip,
+    confusion_panel,
+    coverage_panel,
+    legend_panel,
+    reliability_panel,
+    roc_panel,
+    strip_title,
+)
+from placerec.frames.naming import unique_names
+from placerec.hohmm.beliefs import Beliefs, parse_beliefs, read_beliefs
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MOST_STRIPS = 20
+_SUFFIXES = (".tsv", ".tsv.gz")
 
 # Inches.
-_WIDTH, _MARGIN, _HEAD = 14.0, 0.3, 1.15
+_WIDTH, _HEAD = 14.0, 1.15
 _STRIP_LEFT, _STRIP_WIDTH = 0.75, 7.6
 _SIDE_LEFT, _MATRIX_LEFT = 8.75, 10.3
 _CURVES_LEFT, _CURVE, _CURVE_STEP, _CURVES_HEIGHT = 9.1, 1.95, 2.55, 2.9
+
+
+def evaluate_files(sources: Iterable[Path | str], *, plot: Path | str | None = None) -> Evaluation:
+    """Judge beliefs files, folders of them, or standard input (`-`) by their true places; `plot` gets the picture.
+
+    Files of one name are called by their folders too. Raises EvaluationError for what cannot be read or judged, and
+    what `plot_evaluation` raises.
+    """
+    if plot is not None:
+        check_figure(plot)
+    paths = _files([Path(source) for source in sources])
+    beliefs = [_read(path) for path in paths]
+    names = unique_names([(one.name, path) for one, path in zip(beliefs, paths, strict=True)], EvaluationError)
+    beliefs = [replace(one, stream=one.stream.renamed(name)) for one, name in zip(beliefs, names, strict=True)]
+    evaluation = evaluate(beliefs)
+    if plot is not None:
+        plot_evaluation(beliefs, evaluation, plot)
+    return evaluation
 
 
 def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Path | str) -> None:
@@ -34,7 +65,7 @@ def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Pa
     """
     shown = chosen(beliefs, evaluation)
     places = len(evaluation.places)
-    matrix = min(_WIDTH - _MARGIN - _MATRIX_LEFT, 0.6 * places)
+    matrix = min(_WIDTH - MARGIN - _MATRIX_LEFT, 0.6 * places)
     legend = 0.23 * (places // 2 + 2)
     side = legend + matrix + 2.0
     # The curves stand below one sequence, or else below the matrix.
@@ -46,20 +77,16 @@ def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Pa
     step = strip + 0.42
     height = _HEAD + max(step * len(shown) + 0.15, side)
     with figure_file(path, _WIDTH, height) as figure:
-
-        def panel(left: float, top: float, wide: float, high: float) -> "Axes":
-            return figure.add_axes((left / _WIDTH, 1 - (top + high) / height, wide / _WIDTH, high / height))
-
         _head(figure, evaluation, _selection_note(len(shown), len(beliefs)))
         for number, sequence in enumerate(shown):
-            axes = panel(_STRIP_LEFT, _HEAD + 0.1 + step * number, _STRIP_WIDTH, strip)
+            axes = panel(figure, _STRIP_LEFT, _HEAD + 0.1 + step * number, _STRIP_WIDTH, strip)
             title = strip_title(sequence.name, evaluation.sequences[sequence.name].accuracy)
             belief_strip(axes, sequence, places=evaluation.places, title=title)
         axes.set_xlabel("frame", fontsize=7, labelpad=1)
-        legend_panel(panel(_SIDE_LEFT, _HEAD, _WIDTH - _MARGIN - _SIDE_LEFT, legend), evaluation.places)
-        confusion_panel(panel(_MATRIX_LEFT, _HEAD + legend + 0.5, matrix, matrix), evaluation)
-        reliability_panel(panel(left, _HEAD + top, _CURVE, _CURVE), evaluation.reliability)
-        beside = panel(left + _CURVE_STEP, _HEAD + top, _CURVE, _CURVE)
+        legend_panel(panel(figure, _SIDE_LEFT, _HEAD, _WIDTH - MARGIN - _SIDE_LEFT, legend), evaluation.places)
+        confusion_panel(panel(figure, _MATRIX_LEFT, _HEAD + legend + 0.5, matrix, matrix), evaluation)
+        reliability_panel(panel(figure, left, _HEAD + top, _CURVE, _CURVE), evaluation.reliability)
+        beside = panel(figure, left + _CURVE_STEP, _HEAD + top, _CURVE, _CURVE)
         if evaluation.new_places is not None and evaluation.new_places.auroc is not None:
             roc_panel(beside, evaluation.new_places)
         else:
@@ -95,14 +122,9 @@ def _head(figure: "Figure", evaluation: Evaluation, note: str) -> None:
         f"ECE {evaluation.ece:.3f}",
         f"log loss {evaluation.log_loss:.3f}",
     ]
-    height = figure.get_figheight()
-    lines = [
-        (0.38, 15, "black", f"Accuracy {percent(evaluation.accuracy)}   (majority class, {majority})"),
-        (0.64, 9, "0.25", "  ·  ".join(numbers)),
-        (0.86, 8, "0.4", note),
-    ]
-    for top, size, colour, text in lines:
-        figure.text(_MARGIN / _WIDTH, 1 - top / height, text, fontsize=size, color=colour)
+    write_line(figure, 0.38, f"Accuracy {percent(evaluation.accuracy)}   (majority class, {majority})", 15)
+    write_line(figure, 0.64, "  ·  ".join(numbers), 9, "0.25")
+    write_line(figure, 0.86, note, 8, "0.4")
 
 
 def _selection_note(shown: int, all_of_them: int) -> str:
@@ -110,3 +132,26 @@ def _selection_note(shown: int, all_of_them: int) -> str:
     if shown == all_of_them:
         return reading
     return f"{reading} {shown} of {all_of_them} sequences: the best, the worst and evenly many between by accuracy."
+
+
+def _files(sources: list[Path]) -> list[Path]:
+    files: dict[str, Path] = {}
+    for source in sources:
+        found = (
+            sorted(path for path in source.iterdir() if path.name.endswith(_SUFFIXES)) if source.is_dir() else [source]
+        )
+        if not found:
+            raise EvaluationError(f"{source}: holds no beliefs file (.tsv); write them with `placerec decode -o`")
+        for path in found:
+            if files.setdefault(os.path.abspath(path), path) is not path:
+                raise EvaluationError(f"{path}: is given twice; its frames would count twice")
+    return list(files.values())
+
+
+def _read(path: Path) -> Beliefs:
+    if str(path) != "-":
+        return read_beliefs(path)
+    try:
+        return parse_beliefs(sys.stdin.buffer.read().decode(), name="stdin", source="<stdin>")
+    except UnicodeDecodeError as error:
+        raise EvaluationError(f"<stdin>: byte 0x{error.object[error.start]:02x} is not UTF-8") from error

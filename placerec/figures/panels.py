@@ -1,43 +1,19 @@
-"""The parts that pictures of beliefs are put together from: strips, legend, confusion matrix, and the file.
+"""The parts that pictures of beliefs are put together from: strips, legend, confusion matrix, and curves of trust."""
 
-matplotlib is optional and is imported inside the functions; no pyplot, so no global figure and no window.
-"""
-
-import logging
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.errors import OutputError, check_optional
+from placerec.arrays import Floats, Ints
+from placerec.evaluation.confidence import COVERAGES, ECE_BINS, NewPlaces, Reliability, RiskCoverage
 from placerec.evaluation.metrics import Evaluation, codes, place_order, right_frames
 from placerec.evaluation.summary import percent, shorten
-from placerec.files import whole_file
+from placerec.figures.canvas import BLACK, WHITE, letter_colour, place_colours
 from placerec.hohmm.beliefs import UNKNOWN, Beliefs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-_LOG = logging.getLogger(__name__)
-
-# Dates and versions would make two pictures of the same numbers differ.
-_METADATA: dict[str, dict[str, None]] = {
-    ".png": {"Software": None},
-    ".svg": {"Date": None, "Creator": None},
-    ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-}
-_DPI = 130
-
-# Okabe & Ito (2008) and Tol's muted scheme, mixed so that the first few are furthest apart in lightness and hue for any
-# colour vision. Black is kept for what is wrong.
-_BRIGHT = (0x56B4E9, 0xE69F00, 0x009E73, 0xCC79A7, 0x332288, 0xF0E442)
-_PALETTE = (*_BRIGHT, 0xD55E00, 0x0072B2, 0x999933, 0x882255, 0xDDCC77, 0x999999)
-_WHITE, _BLACK, _GREY = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.78, 0.78, 0.78)
 
 # More columns than this would fall between the pixels of a strip.
 _MOST_COLUMNS = 1500
@@ -49,54 +25,7 @@ _TRUE, _DECIDED, _WRONG = (1.07, 1.43), (-0.33, -0.07), (-0.55, -0.41)
 # The width of a letter of DejaVu Sans, in units of the font's size, on the safe side.
 _LETTER = 0.66
 
-
-@contextmanager
-def figure_file(path: Path | str, width: float, height: float) -> "Iterator[Figure]":
-    """An empty figure of this size in inches, written to `path` (PNG, SVG or PDF by suffix) when the block ends.
-
-    What is drawn in the block depends on nothing of the user's matplotlib settings. Raises OutputError for another
-    suffix or a path that cannot be written, MissingExtraError without matplotlib.
-    """
-    path = Path(path)
-    check_figure(path)
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams["svg.hashsalt"] = "placerec"
-        # A place may be called `a$b$`.
-        matplotlib.rcParams["text.parse_math"] = False
-        figure = Figure(figsize=(width, height))
-        FigureCanvasAgg(figure)
-        yield figure
-        with whole_file(path) as partial, _logged_warnings():
-            figure.savefig(partial, dpi=_DPI, metadata=_METADATA[path.suffix.lower()])
-
-
-def check_figure(path: Path | str) -> None:
-    """Raise what `figure_file` would, of suffix and matplotlib: before an hour of work, and not after it."""
-    if Path(path).suffix.lower() not in _METADATA:
-        raise OutputError(f"{path}: no kind of picture; let its name end in .png, .svg or .pdf")
-    check_optional("matplotlib", "a picture")
-
-
-def place_colours(places: Sequence[str]) -> NDArray[np.float64]:
-    """A colour for each of n places, (n, 3) red, green, blue from 0 to 1; from the thirteenth on they get darker.
-
-    `unknown` is light grey.
-    """
-    base = np.array([[(colour >> shift & 255) / 255 for shift in (16, 8, 0)] for colour in _PALETTE])
-    index = np.arange(len(places))
-    colours: NDArray[np.float64] = base[index % len(base)] * 0.6 ** (index // len(base))[:, None]
-    colours[[place == UNKNOWN for place in places]] = _GREY
-    return colours
-
-
-def letter_colour(ground: NDArray[np.float64]) -> str:
-    """Black or white, whichever is read better on a colour (3,) of red, green, blue."""
-    return "black" if ground @ (0.299, 0.587, 0.114) > 0.45 else "white"
+_BLUE, _GREY = "#4a90c2", "0.55"
 
 
 def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None = None, title: str = "") -> None:
@@ -110,7 +39,7 @@ def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None
     places = place_order([beliefs]) if places is None else places
     frames = len(beliefs.frames)
     # One more colour than places: the last answers for index -1, no label.
-    colours = np.vstack([place_colours(places), _WHITE])
+    colours = np.vstack([place_colours(places), WHITE])
     axes.set(xlim=(0, max(frames, 1)), ylim=(_WRONG[0] - 0.05, _TRUE[1]), facecolor="none")
     axes.spines[:].set_visible(False)
     heights = [sum(span) / 2 for span in (_TRUE, (0, 1), _DECIDED, _WRONG)]
@@ -130,7 +59,7 @@ def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None
         (_TRUE, colours[truth[drawn]][None]),
         ((0.0, 1.0), colours[_stacked(*_shares(beliefs, drawn, places))]),
         (_DECIDED, colours[decided[drawn]][None]),
-        (_WRONG, np.where(wrong[:, None], _BLACK, _WHITE)[None]),
+        (_WRONG, np.where(wrong[:, None], BLACK, WHITE)[None]),
     ]
     for (low, high), image in bars:
         axes.imshow(image, extent=(0, frames, low, high), aspect="auto", interpolation="nearest", origin="lower")
@@ -165,7 +94,7 @@ def legend_panel(axes: "Axes", places: Sequence[str]) -> None:
     """Draw which colour is which place, and what black and white mean."""
     from matplotlib.patches import Patch
 
-    colours = [*map(tuple, place_colours(places).tolist()), _BLACK, _WHITE]
+    colours = [*map(tuple, place_colours(places).tolist()), BLACK, WHITE]
     labels = [*(shorten(place, 22) for place in places), "decided wrongly", "no label"]
     patches = [
         Patch(facecolor=colour, edgecolor="0.5", linewidth=0.5, label=label)
@@ -180,9 +109,7 @@ def strip_title(name: str, accuracy: float | None) -> str:
     return f"{shorten(name, 70)}   {'no frame has a label' if accuracy is None else percent(accuracy) + ' right'}"
 
 
-def _shares(
-    beliefs: Beliefs, drawn: NDArray[np.int64], places: Sequence[str]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _shares(beliefs: Beliefs, drawn: Ints, places: Sequence[str]) -> tuple[Floats, Ints]:
     """The probabilities of the frames `drawn` (n, columns), and the place of each column."""
     belief = beliefs.belief[drawn]
     if beliefs.unknown is None:
@@ -191,16 +118,16 @@ def _shares(
     return np.hstack([belief * (1 - unknown), unknown]), codes((*beliefs.places, UNKNOWN), places)
 
 
-def _stacked(belief: NDArray[np.float64], place: NDArray[np.int64]) -> NDArray[np.int64]:
+def _stacked(belief: Floats, place: Ints) -> Ints:
     """The place at every height of the stacked beliefs: (rows from 0 to 1, frames)."""
     heights = (np.arange(_BELIEF_ROWS) + 0.5) / _BELIEF_ROWS
     below = (np.cumsum(belief, axis=1)[None] <= heights[:, None, None]).sum(axis=2)
     # Rounding may leave the sum a hair under 1.
-    stacked: NDArray[np.int64] = place[np.minimum(below, len(place) - 1)]
+    stacked: Ints = place[np.minimum(below, len(place) - 1)]
     return stacked
 
 
-def _name_visits(axes: "Axes", truth: NDArray[np.int64], places: Sequence[str]) -> None:
+def _name_visits(axes: "Axes", truth: Ints, places: Sequence[str]) -> None:
     """Write a place's name into its bar where there is room: colours alone are hard to look up."""
     font = 6.5
     room = _inches(axes) * 72 / len(truth)
@@ -218,11 +145,35 @@ def _inches(axes: "Axes") -> float:
     return float(axes.bbox.width / axes.figure.dpi)
 
 
-@contextmanager
-def _logged_warnings() -> Iterator[None]:
-    """matplotlib warns where its font lacks a letter of a place's name: told once each, and through the log."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield
-    for message in dict.fromkeys(str(warning.message) for warning in caught):
-        _LOG.warning("picture: %s", message)
+def reliability_panel(axes: "Axes", found: Reliability) -> None:
+    """Draw accuracy over belief in 15 bins, the frames of each bin written in it; on the diagonal is calibrated."""
+    edges = np.arange(ECE_BINS) / ECE_BINS
+    some = found.frames > 0
+    axes.bar(edges[some], found.accuracy[some], 1 / ECE_BINS, align="edge", color=_BLUE, alpha=0.45, edgecolor="white")
+    axes.plot(found.belief[some], found.accuracy[some], "o", color=_BLUE, markersize=2.5)
+    for edge, frames in zip(edges[some].tolist(), found.frames[some].tolist(), strict=True):
+        axes.text(edge + 0.5 / ECE_BINS, 0.02, str(frames), rotation=90, ha="center", va="bottom", fontsize=5.5)
+    _square(axes, f"Reliability: ECE {found.error:.3f}", "belief in what was decided (frames inside)", "right")
+    axes.plot([0, 1], [0, 1], color=_GREY, linewidth=0.8, linestyle="--")
+
+
+def coverage_panel(axes: "Axes", found: RiskCoverage) -> None:
+    """Draw the accuracy of the surest frames over their share."""
+    axes.plot(COVERAGES, found.accuracy, color=_BLUE, marker="o", markersize=2.5, linewidth=1.2)
+    _square(axes, f"Only the surest answered: area {found.area:.3f}", "share of frames answered", "right of these")
+
+
+def roc_panel(axes: "Axes", found: NewPlaces) -> None:
+    """Draw how many frames of new places are noticed over how many others are taken for new; needs both kinds."""
+    axes.plot(found.false_alarms, found.detections, color=_BLUE, linewidth=1.2)
+    _square(axes, f"New places: AUROC {found.auroc:.3f}", "known places taken for new", "new places noticed")
+    axes.plot([0, 1], [0, 1], color=_GREY, linewidth=0.8, linestyle="--")
+
+
+def _square(axes: "Axes", title: str, across: str, up: str) -> None:
+    axes.set(xlim=(0, 1), ylim=(0, 1.02))
+    axes.set_title(title, loc="left", fontsize=8.5)
+    axes.set_xlabel(across, fontsize=7, labelpad=2)
+    axes.set_ylabel(up, fontsize=7, labelpad=2)
+    axes.tick_params(labelsize=6.5, length=2, pad=1.5)
+    axes.spines[["top", "right"]].set_visible(False)

@@ -1,19 +1,38 @@
 """What the dictionary sees in one image: its descriptor, and the units that are nearest to it."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.evaluation.summary import percent, shorten
-from placerec.frames import read_gray
+from placerec.figures.canvas import MARGIN, figure_file, panel, picture_file, write_line
+from placerec.frames import Reading, Sequence, read_gray
 from placerec.frames.sequence import Gray
-from placerec.inspection.words import WordTable
+from placerec.inspection.words import WordTable, look_up, typical_images
+from placerec.jobs import Progress
 from placerec.vision import DescriptorSpec, Dictionary, descriptor, fit_image
 from placerec.vision.pca import project
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 NEAREST = 5
+
+# Inches.
+_WIDTH, _PANEL, _GAP, _HEAD = 14.0, 2.5, 0.225, 1.1
+_SCALES = ("finest", "fine", "coarse", "coarsest")
+_TURNS, _BLOCKS = 6, 4
+_ROSES = (
+    "A rose shows one window: its petals point along the edges there, and are as long as these are strong, each scale "
+    "by its own longest. "
+)
+_BELOW = "Below: the nearest units, the word framed."
+# Okabe and Ito's blue and vermilion: told apart by any eye, and on grey.
+_ROSE, _MARK = "#0072B2", "#D55E00"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +66,33 @@ class FrameView:
             return {"unit": unit, "word": self.words[unit], **own}
         known = self.table.row(unit)
         return {**known, "typical_distance": known["distance"], **own}
+
+
+def show_frame(
+    image: Path | str,
+    words: Path | str,
+    sources: Iterable[Path | str] = (),
+    out: Path | str | None = None,
+    *,
+    reading: Reading = Reading(),
+    progress: Progress | None = None,
+) -> FrameView:
+    """`placerec show-frame`: what a words.npz sees in an image, and which units are nearest to it.
+
+    `sources`: sequences whose frames tell what the units look like and which places they belong to. `out`: the
+    picture to draw. Raises as `show_words` does, and SourceError or VisionError for an image that cannot be used.
+    """
+    with picture_file(out) as picture:
+        dictionary = Dictionary.load(words)
+        view = view_frame(image, dictionary)
+        sequences: list[Sequence] = []
+        if sources := list(sources):
+            table, sequences = look_up(sources, dictionary, reading, progress)
+            view = replace(view, table=table)
+        if picture is not None:
+            typical = {} if view.table is None else typical_images(view.table, sequences, view.nearest)
+            draw_frame_sheet(view, typical, picture)
+    return view
 
 
 def view_frame(image: Path | str, dictionary: Dictionary, table: WordTable | None = None) -> FrameView:
@@ -94,3 +140,122 @@ def unit_note(view: FrameView, unit: int) -> str:
         return "no labelled frame given"
     place = int(view.table.place[unit])
     return f"{shorten(view.table.places[place], 32)} ({percent(float(view.table.share[unit]))})"
+
+
+def draw_frame_sheet(view: FrameView, typical: Mapping[int, Gray], path: Path | str) -> None:
+    """Draw a view as one picture, PNG, SVG or PDF by suffix; `typical`: the nearest units' typical frames, if any.
+
+    Raises OutputError for another suffix or a path that cannot be written, MissingExtraError without matplotlib.
+    """
+    pictures = [typical[unit] for unit in view.nearest if unit in typical]
+    aspect = next((picture.shape[0] / picture.shape[1] for picture in pictures), 0.75)
+    second = _HEAD + _PANEL + 0.7
+    height = second + _PANEL + 0.3
+    with figure_file(path, _WIDTH, height) as figure:
+
+        def bare(left: float, top: float, wide: float = _PANEL) -> "Axes":
+            axes = panel(figure, left, top, wide, _PANEL)
+            axes.set_xticks([])
+            axes.set_yticks([])
+            return axes
+
+        edges = view.spec.kind == "gist"
+        title = f"{shorten(view.name, 70)}: word {view.words[view.unit]}"
+        write_line(figure, 0.42, title, 15)
+        write_line(figure, 0.7, _ROSES * edges + _BELOW, 8.5, "0.25")
+        how = "As the descriptor gets it" + ", in 4 x 4 windows" * edges
+        _fitted(bare(MARGIN, _HEAD), view.picture, how, windows=edges)
+        step = _PANEL + _GAP
+        if edges:
+            for scale, energy in enumerate(energies(view.values)):
+                _roses(bare(MARGIN + (scale + 1) * step, _HEAD), view.picture, energy, _SCALES[scale])
+        else:
+            _values(bare(MARGIN + step + 0.3, _HEAD, _WIDTH - 2 * MARGIN - step - 0.3), view.values)
+        _map(bare(MARGIN, second), view)
+        left, room = MARGIN + step, _WIDTH - 2 * MARGIN - step
+        wide = (room + 0.15) / len(view.nearest) - 0.15
+        for rank, unit in enumerate(view.nearest):
+            axes = bare(left + rank * (wide + 0.15), second, wide)
+            axes.set_box_aspect(aspect)
+            _unit(axes, view, unit, typical.get(unit))
+
+
+def energies(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """GIST (384,) as (scale, turn, row, column): how strong edges are in each window of the picture.
+
+    Scales from the finest; turn t: edges at 90 + 30 t degrees, counted as on paper, counter-clockwise from the right.
+    """
+    return values.reshape(len(_SCALES), _TURNS, _BLOCKS, _BLOCKS).transpose(0, 1, 3, 2)
+
+
+def _fitted(axes: "Axes", picture: NDArray[Any], title: str, *, windows: bool, paleness: float = 0.0) -> None:
+    """The picture, with the lines between its 4 x 4 windows or not; `paleness` 1 is white."""
+    side = picture.shape[0]
+    shown = picture * (1 - paleness) + 255 * paleness
+    axes.imshow(shown, cmap="gray", vmin=0, vmax=255, extent=(0, side, side, 0), interpolation="nearest")
+    for line in np.arange(1, _BLOCKS) * side / _BLOCKS if windows else []:
+        axes.axhline(line, color="0.75", linewidth=0.7)
+        axes.axvline(line, color="0.75", linewidth=0.7)
+    axes.set(xlim=(0, side), ylim=(side, 0))
+    axes.spines[:].set_color("0.7")
+    axes.set_title(title, loc="left", fontsize=8.5)
+
+
+def _roses(axes: "Axes", picture: NDArray[Any], energy: NDArray[np.float32], name: str) -> None:
+    """A rose in every window from energies (turn, row, column): petals point along the edges."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Wedge
+
+    _fitted(axes, picture, f"Edges of the {name} scale", windows=True, paleness=0.85)
+    cell = picture.shape[0] / _BLOCKS
+    largest = float(energy.max()) or 1.0
+    petals = []
+    for turn, row, column in np.ndindex(*energy.shape):
+        centre = (column + 0.5) * cell, (row + 0.5) * cell
+        radius = 0.48 * cell * float(energy[turn, row, column]) / largest
+        # Rows are counted downwards, and angles therefore clockwise.
+        angle = -(90 + 180 / _TURNS * turn)
+        for direction in (angle, angle + 180):
+            half = 90 / _TURNS
+            petals.append(Wedge(centre, radius, direction - half, direction + half))
+    axes.add_collection(PatchCollection(petals, facecolor=_ROSE, edgecolor="white", linewidth=0.3, zorder=2))
+    text = f"mean energy {energy.mean():.3g}; the longest petal {energy.max():.3g}"
+    axes.set_xlabel(text, fontsize=7.5, loc="left", color="0.25")
+
+
+def _values(axes: "Axes", values: NDArray[np.float32]) -> None:
+    """A descriptor whose values have no place in the picture, as bars."""
+    axes.stairs(values, fill=True, color=_ROSE)
+    axes.set_xlim(0, len(values))
+    axes.set_title(f"The {len(values)} values of the descriptor", loc="left", fontsize=8.5)
+    axes.set_yticks([0.0, float(values.max())], labels=["0", f"{values.max():.3g}"], fontsize=7)
+    axes.spines[:].set_color("0.7")
+
+
+def _map(axes: "Axes", view: FrameView) -> None:
+    """How far every unit is, dark for near, and the word."""
+    size = round(len(view.words) ** 0.5)
+    axes.imshow(view.distances.reshape(size, size), cmap="Greys_r", interpolation="nearest")
+    dead = np.argwhere(view.hits.reshape(size, size) == 0)
+    axes.plot(dead[:, 1], dead[:, 0], "x", color="0.5", markersize=min(5.0, 60 / size), markeredgewidth=0.8)
+    row, column = divmod(view.unit, size)
+    marker = max(6.0, 150 / size)
+    axes.plot(column, row, "s", markersize=marker, color="none", markeredgecolor=_MARK, markeredgewidth=2)
+    axes.set_title("The units of the map, dark for near", loc="left", fontsize=8.5)
+    axes.set_xlabel("square: the word; crosses: hit by no training frame", fontsize=7.5, loc="left", color="0.25")
+    axes.spines[:].set_color("0.7")
+
+
+def _unit(axes: "Axes", view: FrameView, unit: int, picture: NDArray[Any] | None) -> None:
+    """One of the nearest units: its typical frame if there is one, how far it is, and what there is to say of it."""
+    chosen = unit == view.unit
+    if picture is None:
+        axes.set_facecolor("0.95")
+        hint = "no frame to show" if view.table is not None else "give a SOURCE to see it"
+        axes.text(0.5, 0.5, hint, transform=axes.transAxes, ha="center", fontsize=8, color="0.5")
+    else:
+        axes.imshow(picture, cmap="gray", vmin=0, vmax=255, aspect="auto")
+    axes.set_anchor("N")
+    axes.spines[:].set(color=_MARK if chosen else "0.7", linewidth=2.5 if chosen else 0.8)
+    axes.set_title(f"{view.words[unit]}, distance {view.distances[unit]:.3g}", loc="left", fontsize=8.5)
+    axes.set_xlabel(unit_note(view, unit), fontsize=7.5, loc="left", color="0.25")

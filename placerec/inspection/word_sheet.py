@@ -1,7 +1,7 @@
 """One sheet of all words: the typical frame of every unit on the lattice of the map, framed in its place's colour."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -10,16 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.evaluation.summary import shorten
-from placerec.figures.panels import figure_file, letter_colour, place_colours
+from placerec.figures.canvas import (
+    MARGIN,
+    figure_file,
+    letter_colour,
+    panel,
+    picture_file,
+    place_colours,
+    write_line,
+)
+from placerec.frames import Reading
 from placerec.frames.sequence import Gray
-from placerec.inspection.words import WordTable, word_sentences
+from placerec.inspection.words import WordTable, look_up, typical_images, word_sentences
+from placerec.jobs import Progress
+from placerec.vision import Dictionary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # Inches.
-_MARGIN, _SIDE, _GAP, _ROW = 0.3, 3.6, 0.5, 0.2
+_SIDE, _GAP, _ROW = 3.6, 0.5, 0.2
 _LEAST_WIDTH = 10.0
 # Pixels across a tile in the picture; the rest of a tile's cell, in shares of its width, is frame and bar.
 _PIXELS = 128
@@ -50,6 +60,30 @@ class _Tiles:
         return self.inner * self.aspect + self.width * (2 * _FRAME + _BAR)
 
 
+def show_words(
+    words: Path | str,
+    sources: Iterable[Path | str],
+    out: Path | str | None = None,
+    *,
+    matrix: Path | str | None = None,
+    reading: Reading = Reading(),
+    progress: Progress | None = None,
+) -> WordTable:
+    """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
+
+    `out`: the picture to draw, PNG, SVG or PDF by suffix. `matrix`: the frames' descriptors, for a dictionary of
+    descriptors that were computed elsewhere (`describe`). Raises what `find_sequences`, `describe` and
+    `draw_word_sheet` raise.
+    """
+    with picture_file(out) as picture:
+        dictionary = Dictionary.load(words)
+        table, sequences = look_up(sources, dictionary, reading, progress, matrix)
+        if picture is not None:
+            images = typical_images(table, sequences)
+            draw_word_sheet(table, images, picture, title=f"The words of {Path(words).name}")
+    return table
+
+
 def draw_word_sheet(table: WordTable, images: Mapping[int, Gray], path: Path | str, *, title: str) -> None:
     """Draw the words as one picture, PNG, SVG or PDF by suffix; `images`: each unit's typical frame, if it has one.
 
@@ -61,40 +95,31 @@ def draw_word_sheet(table: WordTable, images: Mapping[int, Gray], path: Path | s
     # Big enough to be recognised, as long as the sheet can be opened at all.
     tiles = _Tiles(table.size, min(1.6, max(0.8, 5 / table.size), 32 / table.size), aspect)
     lattice = tiles.width * table.size, tiles.height * table.size
-    width = max(_LEAST_WIDTH, 2 * _MARGIN + 0.3 + lattice[0] + _GAP + _SIDE)
-    lines = [line for text in (*word_sentences(table), _READING) for line in _wrapped(text, width - 2 * _MARGIN, 8.5)]
+    width = max(_LEAST_WIDTH, 2 * MARGIN + 0.3 + lattice[0] + _GAP + _SIDE)
+    lines = [line for text in (*word_sentences(table), _READING) for line in _wrapped(text, width - 2 * MARGIN, 8.5)]
     head = 0.62 + 0.17 * len(lines)
     legend = _ROW * (len(table.places) + 2)
     # Below each other where the lattice is high enough for it, else side by side.
     beside = (_SIDE - 0.3) / 2
     below = min(3.0, (lattice[1] + 0.2 - legend) / 2 - 0.75)
     maps = max(beside, below)
-    height = head + max(0.3 + lattice[1], legend + 0.8 + maps) + _MARGIN
+    height = head + max(0.3 + lattice[1], legend + 0.8 + maps) + MARGIN
     with figure_file(path, width, height) as figure:
-
-        def panel(left: float, top: float, wide: float, high: float) -> "Axes":
-            return figure.add_axes((left / width, 1 - (top + high) / height, wide / width, high / height))
-
-        _head(figure, title, lines)
-        _lattice(panel(_MARGIN + 0.3, head + 0.2, *lattice), table, pictures, tiles)
-        side = _MARGIN + 0.3 + lattice[0] + _GAP
-        _legend(panel(side, head, _SIDE, legend), table)
+        write_line(figure, 0.42, shorten(title, int(width * 8)), 15)
+        for number, line in enumerate(lines):
+            write_line(figure, 0.7 + 0.17 * number, line, 8.5, "0.25")
+        _lattice(panel(figure, MARGIN + 0.3, head + 0.2, *lattice), table, pictures, tiles)
+        side = MARGIN + 0.3 + lattice[0] + _GAP
+        _legend(panel(figure, side, head, _SIDE, legend), table)
         top = head + legend + 0.5
-        _heat(panel(side, top, maps, maps), table, table.hits, "Blues", "Training frames per unit")
+        _heat(panel(figure, side, top, maps, maps), table, table.hits, "Blues", "Training frames per unit")
         spot = (side, top + maps + 0.75) if below >= beside else (side + maps + 0.3, top)
-        _heat(panel(*spot, maps, maps), table, table.u_matrix, "Greys", "U-matrix")
+        _heat(panel(figure, *spot, maps, maps), table, table.u_matrix, "Greys", "U-matrix")
 
 
 def _wrapped(text: str, room: float, size: float) -> list[str]:
     """The text in lines of `room` inches, in a font of `size` points whose letters are half as wide on the average."""
     return textwrap.wrap(text, int(room * 72 / (0.54 * size)))
-
-
-def _head(figure: "Figure", title: str, lines: Sequence[str]) -> None:
-    width, height = figure.get_size_inches()
-    figure.text(_MARGIN / width, 1 - 0.42 / height, shorten(title, int(width * 8)), fontsize=15)
-    for number, line in enumerate(lines):
-        figure.text(_MARGIN / width, 1 - (0.7 + 0.17 * number) / height, line, fontsize=8.5, color="0.25")
 
 
 def _lattice(axes: "Axes", table: WordTable, pictures: Sequence[Any], tiles: _Tiles) -> None:

@@ -1,17 +1,43 @@
 """How stable the words are, as text and as a picture."""
 
+from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
 from placerec.evaluation.summary import percent
-from placerec.figures.panels import figure_file
-from placerec.vision.stability import Stability
+from placerec.figures.canvas import figure_file, picture_file
+from placerec.frames import Reading, find_sequences
+from placerec.jobs import Progress
+from placerec.vision import Dictionary
+from placerec.vision.stability import Stability, word_changes
 
 # Okabe and Ito's vermilion and sky blue.
 _FAR, _NEAR = "#D55E00", "#56B4E9"
 _NEXT = "the next frame, for comparison"
+
+
+def stability(
+    sources: Iterable[Path | str],
+    words: Path | str,
+    out: Path | str | None = None,
+    *,
+    reading: Reading = Reading(),
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Stability:
+    """`placerec stability`: how many frames of the sources get another word by what a camera does to pictures.
+
+    `out`: the picture to draw. `seed`: of the noise. Raises as
+    `find_sequences`, `Dictionary.load` and `plot_stability`.
+    """
+    with picture_file(out) as picture:
+        dictionary = Dictionary.load(words)
+        found = word_changes(find_sequences(sources, reading=reading), dictionary, seed=seed, progress=progress)
+        if picture is not None:
+            plot_stability(found, picture)
+    return found
 
 
 def format_stability(found: Stability) -> str:

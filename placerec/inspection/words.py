@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -9,10 +10,11 @@ from numpy.typing import NDArray
 
 from placerec.errors import SourceError
 from placerec.evaluation.summary import percent, shorten
-from placerec.frames import Sequence, images_at
+from placerec.frames import Reading, Sequence, find_sequences, images_at
 from placerec.frames.sequence import Gray
 from placerec.frames.table import FrameTable
-from placerec.vision import Descriptors, Dictionary
+from placerec.jobs import Progress
+from placerec.vision import Descriptors, Dictionary, describe
 from placerec.vision.pca import project
 from placerec.vision.som import best_units
 
@@ -93,6 +95,18 @@ class WordTable:
     def agreeing(self) -> int:
         """Labelled frames whose place is the one that their word mostly belongs to."""
         return int(self.votes.max(axis=1, initial=0).sum())
+
+
+def look_up(
+    sources: Iterable[Path | str],
+    dictionary: Dictionary,
+    reading: Reading,
+    progress: Progress | None,
+    matrix: Path | str | None = None,
+) -> tuple[WordTable, list[Sequence]]:
+    """The table of the frames of some sources, and their sequences. Raises as `find_sequences` and `describe`."""
+    sequences = find_sequences(sources, reading=reading)
+    return word_table(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary), sequences
 
 
 def word_table(descriptors: Descriptors, dictionary: Dictionary) -> WordTable:

@@ -11,9 +11,7 @@ from helpers.small_world import write_images
 
 from placerec.errors import SourceError
 from placerec.frames import find_sequences
-from placerec.inspection.frame import FrameView, format_frame, view_frame
-from placerec.inspection.frame_sheet import energies
-from placerec.inspection.show import show_frame
+from placerec.inspection.frame import FrameView, energies, format_frame, show_frame, view_frame
 from placerec.vision import DescriptorSpec, Dictionary, describe, gist
 
 SPEC = DescriptorSpec(image_size=16)

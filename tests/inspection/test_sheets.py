@@ -13,8 +13,7 @@ from placerec.errors import MissingExtraError, OutputError, VisionError
 from placerec.frames import read_gray
 from placerec.frames.sequence import Gray
 from placerec.frames.table import FrameTable
-from placerec.inspection import show
-from placerec.inspection.show import show_frame, show_words, stability
+from placerec.inspection import show_frame, show_words, stability, word_stability, words
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.word_stability import format_stability, plot_stability
 from placerec.inspection.words import WordTable
@@ -196,13 +195,13 @@ def test_what_cannot_be_drawn_is_found_out_before_the_work(
     def work(*args: object, **options: object) -> None:
         raise AssertionError("the images were read first")
 
-    monkeypatch.setattr(show, "describe", work)
-    monkeypatch.setattr(show, "word_changes", work)
-    words = world / "words.npz"
+    monkeypatch.setattr(words, "describe", work)
+    monkeypatch.setattr(word_stability, "word_changes", work)
+    dictionary = world / "words.npz"
     commands = (
-        lambda out: show_words(words, [world / "seq1"], out),
-        lambda out: show_frame(min((world / "seq1/std_cam").iterdir()), words, [world / "seq1"], out),
-        lambda out: stability([world / "seq1"], words, out),
+        lambda out: show_words(dictionary, [world / "seq1"], out),
+        lambda out: show_frame(min((world / "seq1/std_cam").iterdir()), dictionary, [world / "seq1"], out),
+        lambda out: stability([world / "seq1"], dictionary, out),
     )
     (tmp_path / "file").write_text("")
     for command in commands:

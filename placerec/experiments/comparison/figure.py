@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from placerec.evaluation.summary import percent, shorten
 from placerec.experiments.comparison.benchmark import COMPARED, DESCRIPTORS, TWO_WORDS, WORDS
 from placerec.experiments.comparison.results import Comparison, MethodScore
-from placerec.figures.panels import figure_file, place_colours
+from placerec.figures.canvas import figure_file, place_colours
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

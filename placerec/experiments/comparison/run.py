@@ -20,7 +20,7 @@ from placerec.experiments.comparison.encoded import encode
 from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
-from placerec.figures.panels import check_figure
+from placerec.figures.canvas import check_figure
 from placerec.files import whole_folder, write_text
 from placerec.frames import Reading, find_sequences
 from placerec.frames import Sequence as FrameSequence

@@ -12,7 +12,7 @@ import numpy as np
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.results import Row, Setting, by_seed, setting_of
 from placerec.figures import figure_file
-from placerec.figures.panels import place_colours
+from placerec.figures.canvas import place_colours
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

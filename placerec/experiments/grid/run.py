@@ -11,7 +11,7 @@ from placerec.experiments.grid.jobs import GridJob, find_jobs
 from placerec.experiments.grid.report import write_reports
 from placerec.experiments.grid.results import FoldData, Results, Row, SequenceCount, write_results
 from placerec.experiments.store import held_output
-from placerec.figures.panels import check_figure
+from placerec.figures.canvas import check_figure
 from placerec.jobs import ProgressBar, map_jobs, silent
 
 log = logging.getLogger(__name__)
