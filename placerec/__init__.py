@@ -28,8 +28,8 @@ _ROOMS = {
         "read_beliefs",
         "read_transitions",
     ),
-    "placerec.model": ("Decoding", "Options", "calibrate", "follow_live", "load_recognizer", "train_lm", "update"),
-    "placerec.methods": ("decode", "load_decoder"),
+    "placerec.model": ("Decoding", "Options", "calibrate", "load_recognizer", "train_lm", "update"),
+    "placerec.methods": ("decode", "follow_live", "load_decoder"),
     "placerec.evaluation": ("evaluate",),
     "placerec.experiments.comparison": ("compare",),
     "placerec.experiments.grid": ("experiment",),
@@ -62,8 +62,8 @@ if TYPE_CHECKING:
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.checks import check_model
     from placerec.lm.inspection import inspect_model
-    from placerec.methods import decode, load_decoder
-    from placerec.model import Decoding, Options, calibrate, follow_live, load_recognizer, train_lm, update
+    from placerec.methods import decode, follow_live, load_decoder
+    from placerec.model import Decoding, Options, calibrate, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize

@@ -2,7 +2,6 @@
 
 import sys
 from contextlib import closing
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -89,9 +88,9 @@ def decode(
     and answers each at once. With -w and --live, TOKENS is a camera (camera:0, camera:/dev/video2,
     camera:rtsp://...) or a video; frames that come too fast are dropped, and Ctrl-C ends it.
     """
-    from placerec.methods import check_method, load_decoder, make_decoder
+    from placerec.hohmm import format_beliefs
+    from placerec.methods import check_method, decode_lines, decode_live, load_decoder
     from placerec.methods import decode as run
-    from placerec.model import decode_lines, decode_live, format_beliefs
 
     with usage("--method"):
         check_method(method, options, scorer=scorer)
@@ -99,9 +98,15 @@ def decode(
         if words is None or len(tokens) > 1 or Path("-") in tokens:
             raise click.UsageError("--live takes one camera or video, and needs -w to see it")
         _check_answering("--live", out, options)
-        make = partial(make_decoder, method)
         answers = decode_live(
-            tokens[0], model, words=words, reading=reading, options=options, scorer=scorer, as_json=as_json, make=make
+            tokens[0],
+            model,
+            words=words,
+            method=method,
+            reading=reading,
+            options=options,
+            scorer=scorer,
+            as_json=as_json,
         )
         with closing(answers):
             for line in answers:

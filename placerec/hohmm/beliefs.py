@@ -7,8 +7,9 @@ place with its belief. The places' columns sum to 1. A last column `unknown`, th
 them, stands beside them: they hold given that it is not, and `best` is `unknown` where it is above 1/2.
 """
 
+import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -102,52 +103,62 @@ def list_places(places: Sequence[str]) -> str:
     return f"{len(places)} places: {names if len(names) <= 60 else names[:57] + '...'}"
 
 
+class BeliefRow(NamedTuple):
+    """A frame's line of a beliefs file: `time` in seconds, nan where unknown; `place` the true one, "" without a label.
+
+    `belief`: C probabilities; `unknown`: that the place is none of them, None where the file has no such column.
+    """
+
+    frame: str
+    time: float
+    place: str
+    word: str
+    selected: bool
+    best: str
+    belief: Sequence[float]
+    unknown: float | None = None
+
+
 def format_header(places: Iterable[str], *, unknown: bool = False) -> str:
     """The header line for these places, without its line end; raises OutputError for a name that cannot be a column."""
     return _line((*COLUMNS, *places, *([UNKNOWN] if unknown else [])))
 
 
-def format_row(
-    frame: str,
-    time: float,
-    place: str,
-    word: str,
-    selected: bool,
-    best: str,
-    belief: Iterable[float],
-    unknown: float | None = None,
-) -> str:
-    """One frame's line, without its line end.
+def format_row(row: BeliefRow) -> str:
+    """A frame's line, without its line end: times to the microsecond, probabilities with nine significant digits.
 
-    time: seconds, nan where unknown, written to the microsecond; belief: C probabilities, and `unknown` where the
-    header has it, written with nine significant digits. Raises OutputError for a text that holds a tab or a line end.
+    Raises OutputError for a text that holds a tab or a line end.
     """
     # Not repr: frames are often stamped in epoch seconds, where anything after the microsecond is noise.
-    seconds = "" if math.isnan(time) else np.format_float_positional(time, precision=6, trim="-")
-    numbers = [*belief] if unknown is None else [*belief, unknown]
-    return _line((frame, seconds, place, word, "1" if selected else "0", best, *(f"{p:.9g}" for p in numbers)))
+    seconds = "" if math.isnan(row.time) else np.format_float_positional(row.time, precision=6, trim="-")
+    numbers = [*row.belief] if row.unknown is None else [*row.belief, row.unknown]
+    texts = (f"{p:.9g}" for p in numbers)
+    return _line((row.frame, seconds, row.place, row.word, "1" if row.selected else "0", row.best, *texts))
+
+
+def format_json_row(places: Iterable[str], row: BeliefRow) -> str:
+    """A frame's line as a JSON object: `time` and `place` null where unknown, `belief` from place to probability."""
+    values = row._asdict() | {"time": None if math.isnan(row.time) else row.time, "place": row.place or None}
+    values["belief"] = dict(zip(places, row.belief, strict=True))
+    unknown = values.pop("unknown")
+    return json.dumps(values if unknown is None else values | {UNKNOWN: unknown}, ensure_ascii=False)
+
+
+def format_beliefs(beliefs: Beliefs, *, as_json: bool = False) -> str:
+    """The text of a beliefs file: TSV with a header, or one JSON object a line."""
+    unknown = [None] * len(beliefs) if beliefs.unknown is None else beliefs.unknown.tolist()
+    stream, numbers = beliefs.stream, (beliefs.selected.tolist(), beliefs.best, beliefs.belief.tolist(), unknown)
+    rows = map(BeliefRow, stream.frames, stream.times.tolist(), stream.places, stream.words, *numbers)
+    if as_json:
+        lines = [format_json_row(beliefs.places, row) for row in rows]
+    else:
+        lines = [format_header(beliefs.places, unknown=beliefs.unknown is not None), *map(format_row, rows)]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def write_beliefs(path: Path | str, beliefs: Beliefs) -> None:
     """Write one sequence's beliefs, gzipped if `path` ends in .gz; raises OutputError if that cannot be done."""
-    lines = [format_header(beliefs.places, unknown=beliefs.unknown is not None)]
-    lines += [format_row(*row) for row in belief_rows(beliefs)]
-    write_text(Path(path), "\n".join(lines) + "\n")
-
-
-def belief_rows(beliefs: Beliefs) -> Iterator[tuple[str, float, str, str, bool, str, list[float], float | None]]:
-    """What `format_row` takes, frame by frame."""
-    return zip(
-        beliefs.frames,
-        beliefs.times.tolist(),
-        beliefs.truth,
-        beliefs.words,
-        beliefs.selected.tolist(),
-        beliefs.best,
-        beliefs.belief.tolist(),
-        [None] * len(beliefs.frames) if beliefs.unknown is None else beliefs.unknown.tolist(),
-        strict=True,
-    )
+    write_text(Path(path), format_beliefs(beliefs))
 
 
 def read_beliefs(path: Path | str) -> Beliefs:
@@ -196,17 +207,6 @@ def parse_beliefs(text: str, *, name: str, source: Path | str) -> Beliefs:
     )
 
 
-class _Row(NamedTuple):
-    frame: str
-    time: float
-    place: str
-    word: str
-    selected: bool
-    best: str
-    belief: list[float]
-    unknown: float  # nan without that column
-
-
 def _line(fields: Iterable[str]) -> str:
     fields = tuple(fields)
     for text in fields:
@@ -234,7 +234,7 @@ def _places(header: list[str], source: Path | str) -> tuple[str, ...]:
     return tuple(places)
 
 
-def _row(fields: list[str], header: list[str], places: tuple[str, ...], answers: frozenset[str]) -> _Row:
+def _row(fields: list[str], header: list[str], places: tuple[str, ...], answers: frozenset[str]) -> BeliefRow:
     if len(fields) != len(header):
         raise ValueError(f"the line has {len(fields)} of the header's {len(header)} fields; mend or remove it")
     frame, time, place, word, selected, best = fields[: len(COLUMNS)]
@@ -244,10 +244,10 @@ def _row(fields: list[str], header: list[str], places: tuple[str, ...], answers:
         raise ValueError(f"best is {best!r}, which is no place of the header; the places are {', '.join(places)}")
     cells = fields[len(COLUMNS) :]
     numbers = [_probability(cell, column) for cell, column in zip(cells, header[len(COLUMNS) :], strict=True)]
-    belief, unknown = numbers[: len(places)], numbers[-1] if UNKNOWN in answers else math.nan
+    belief, unknown = numbers[: len(places)], numbers[-1] if UNKNOWN in answers else None
     if abs(math.fsum(belief) - 1) > _SUM_TOLERANCE:
         raise ValueError(f"the beliefs sum to {math.fsum(belief):.6g}, not to 1; decode the sequence again")
-    return _Row(frame, _seconds(time), place, word, selected == "1", best, belief, unknown)
+    return BeliefRow(frame, _seconds(time), place, word, selected == "1", best, belief, unknown)
 
 
 def _seconds(text: str) -> float:

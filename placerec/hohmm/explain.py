@@ -13,7 +13,7 @@ which the transitions make smaller step by step: words fade as the filter forget
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,12 +23,14 @@ from placerec.hohmm.evidence import Evidence
 from placerec.hohmm.filter import filter_stream
 from placerec.hohmm.motion import CHUNK, motion, predict_beliefs
 from placerec.hohmm.offline import unknown_ratios
-from placerec.hohmm.recognizer import Recognizer
 from placerec.hohmm.transitions import Transition
+from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
 from placerec.lm.inspection import explain as explain_word
 from placerec.words import WordStream
 
+# A decision as plain data: a line of NAME.explain.jsonl (docs/files.md).
+Decision = dict[str, Any]
 # The end of the names of files with a decision a line.
 EXPLAINED = ".explain.jsonl"
 # How many selected words are asked for their contribution, and how many of them are named on either side.
@@ -40,40 +42,84 @@ NEVER = -99.0
 _OF_PLACE, _OF_UNKNOWN = ("log10_p", "before", "after"), ("log10_ratio", "before", "after")
 
 
-def explain_stream(
-    recognizer: Recognizer, models: Mapping[str, BackoffModel], stream: WordStream
-) -> Iterator[dict[str, Any]]:
-    """For each selected frame of a sequence a decision, as plain data (docs/files.md); `models` of the places in order.
+class TakenIn(NamedTuple):
+    """A selected word as the filter took it in, on-line.
 
-    The beliefs are the filter's own, before any calibration.
+    `frame`: its number, from 0; `time`: seconds, None where unknown; `steps` of the transitions since the word before;
+    `log10_p`, `before`, `after` float64 (C,): of the word in each place, and the beliefs before and after it; `news`
+    float64 (3,): see `_news`.
     """
+
+    frame: int
+    time: float | None
+    word: str
+    steps: float
+    log10_p: Floats
+    before: Floats
+    after: Floats
+    news: Floats | None
+
+
+def explain_last(taken_in: Sequence[TakenIn], models: Mapping[str, BackoffModel], transition: Transition) -> Decision:
+    """What decided after the last of some words, one at least, of which WINDOW are enough."""
+    frames, times, words, steps, log10_p, before, after, news = zip(*taken_in, strict=True)
+    n = len(taken_in)
+    part = Evidence(np.ones(n, bool), np.arange(n), np.array(log10_p), np.array(steps))
+    seconds = [math.nan if time is None else time for time in times]
+    stream = WordStream.of("", words, frames=map(str, frames), times=seconds)
+    asked = None if news[-1] is None else np.array(news)
+    *_, last = _decisions(part, stream, models, transition, np.array(before), np.array(after), asked)
+    return last
+
+
+def explain_part(
+    part: Evidence,
+    stream: WordStream,
+    models: Mapping[str, BackoffModel],
+    transition: Transition,
+    unknown: UnknownModel | None,
+) -> Iterator[Decision]:
+    """What decided after each selected word of a part of a stream; `models` of the places, in order."""
+    before, after = _beliefs(part.log10_p, transition, part.elapsed)
+    news = None if unknown is None else _news(part, transition, unknown, stream.distances[part.at])
+    return _decisions(part, stream, models, transition, before, after, news)
+
+
+def _decisions(
+    part: Evidence,
+    stream: WordStream,
+    models: Mapping[str, BackoffModel],
+    transition: Transition,
+    before: Floats,
+    after: Floats,
+    news: Floats | None,
+) -> Iterator[Decision]:
+    """A decision for each of U words, from the beliefs (U, C) before and after it and what it says of a new place."""
+    places = tuple(models)
     answer = _answers(models)
     longest = max(model.order for model in models.values()) - 1
-    for part in recognizer.evidence(stream):
-        before, after = _beliefs(part.log10_p, recognizer.transition, part.elapsed)
-        order = np.argsort(-after, axis=1, kind="stable")
-        contributed = contributions(part, recognizer.transition, before, after, order[:, :2])
-        news = _news(recognizer, part, stream)
-        words = [stream.words[i] for i in part.at.tolist()]
-        numbers = np.stack([part.log10_p, before, after], axis=2)
-        for t, i in enumerate(part.at.tolist()):
-            history = words[max(0, t - longest) : t]
-            best, *others = [recognizer.places[column] for column in order[t].tolist()]
-            recent = [(stream.frames[part.at[t - k]], words[t - k]) for k in range(min(WINDOW, t + 1))]
-            said = zip(recognizer.places, numbers[t].tolist(), strict=True)
-            yield {
-                "frame": stream.frames[i],
-                "time": None if math.isnan(stream.times[i]) else float(stream.times[i]),
-                "place": stream.places[i] or None,
-                "word": words[t],
-                "history": history,
-                "best_before": recognizer.places[int(before[t].argmax())],
-                "best": best,
-                "rival": others[0] if others else None,
-                "places": {place: _named(_OF_PLACE, row) | answer(place, (*history, words[t])) for place, row in said},
-                **_arguments(recent, contributed[t].tolist()),
-                **({} if news is None else {"unknown": _named(_OF_UNKNOWN, news[t].tolist())}),
-            }
+    order = np.argsort(-after, axis=1, kind="stable")
+    contributed = contributions(part, transition, before, after, order[:, :2])
+    words = [stream.words[i] for i in part.at.tolist()]
+    numbers = np.stack([part.log10_p, before, after], axis=2)
+    for t, i in enumerate(part.at.tolist()):
+        history = words[max(0, t - longest) : t]
+        best, *others = [places[column] for column in order[t].tolist()]
+        recent = [(stream.frames[part.at[t - k]], words[t - k]) for k in range(min(WINDOW, t + 1))]
+        said = zip(places, numbers[t].tolist(), strict=True)
+        yield {
+            "frame": stream.frames[i],
+            "time": None if math.isnan(stream.times[i]) else float(stream.times[i]),
+            "place": stream.places[i] or None,
+            "word": words[t],
+            "history": history,
+            "best_before": places[int(before[t].argmax())],
+            "best": best,
+            "rival": others[0] if others else None,
+            "places": {place: _named(_OF_PLACE, row) | answer(place, (*history, words[t])) for place, row in said},
+            **_arguments(recent, contributed[t].tolist()),
+            **({} if news is None else {"unknown": _named(_OF_UNKNOWN, news[t].tolist())}),
+        }
 
 
 def contributions(part: Evidence, transition: Transition, before: Floats, after: Floats, pair: Ints) -> Floats:
@@ -112,12 +158,10 @@ def _beliefs(log10_p: Floats, transition: Transition, elapsed: Floats) -> tuple[
     return predict_beliefs(after, transition, elapsed), after
 
 
-def _news(recognizer: Recognizer, part: Evidence, stream: WordStream) -> Floats | None:
+def _news(part: Evidence, transition: Transition, model: UnknownModel, distances: Floats) -> Floats:
     """Per selected word what it says of a new place, log10, and the probability of that before and after: (U, 3)."""
-    if recognizer.unknown is None:
-        return None
-    ratios = unknown_ratios(part, recognizer.transition, recognizer.unknown, stream.distances[part.at])
-    places = len(recognizer.places)
+    ratios = unknown_ratios(part, transition, model, distances)
+    places = part.log10_p.shape[1]
     before, after = _beliefs(unknown.chain_evidence(ratios, places), unknown.CHAIN, part.elapsed)
     before[:1, 0], _ = unknown.prior(places)
     return np.stack([ratios / math.log(10), before[:, 0], after[:, 0]], axis=1)

@@ -1,8 +1,11 @@
 """The filter one word at a time, in plain floats and constant memory; its numbers are those of `filter_stream`."""
 
 from collections.abc import Sequence
-from math import log
+from math import exp, log
 
+import numpy as np
+
+from placerec.arrays import Floats
 from placerec.hohmm.filter import filter_step
 from placerec.hohmm.motion import Predict, predictor
 from placerec.hohmm.transitions import Transition
@@ -37,3 +40,9 @@ class OnlineFilter:
         """Take in a word with log10 p (C) in each state; whether any state explains it."""
         self.log_belief, explained = filter_step(self.log_belief, log10_p)
         return explained
+
+    def belief(self) -> Floats:
+        """The belief, float64 (C,); sums to 1."""
+        belief = np.array([exp(b) for b in self.log_belief])
+        normal: Floats = belief / belief.sum()
+        return normal

@@ -1,21 +1,22 @@
-"""The recognizer: words (or images) in, belief over places out; one at a time, or a whole sequence."""
+"""The recognizer: the filter over the language models of places, on-line or over a whole sequence."""
 
 import logging
 import math
-from collections.abc import Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
 from placerec.hohmm import unknown as new_place
-from placerec.hohmm.beliefs import UNKNOWN, Beliefs
+from placerec.hohmm.beliefs import Beliefs
 from placerec.hohmm.calibration import Calibration
+from placerec.hohmm.decoder import Posterior, SequenceDecoder, TakeIn, warn_of_unlisted
 from placerec.hohmm.emissions import Emissions, common_words
 from placerec.hohmm.evidence import Evidence, evidence_in
+from placerec.hohmm.explain import WINDOW, Decision, TakenIn, explain_last, explain_part
 from placerec.hohmm.filter import LN10
 from placerec.hohmm.offline import believe, believe_unknown, most_probable_path
 from placerec.hohmm.online import OnlineFilter
@@ -23,7 +24,7 @@ from placerec.hohmm.transitions import Transition, fixed_transition
 from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
 from placerec.lm.union import unite_models
-from placerec.words import Selection, WordStream, selector
+from placerec.words import Selection, WordStream
 
 if TYPE_CHECKING:
     from placerec.vision import Dictionary
@@ -31,50 +32,29 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Belief:
-    """What is believed after one frame: `probability` float64 (C,) beside `places`, summing to 1.
-
-    `unknown`: the probability that the place is none of them, None where nobody asked; the others hold if it is one.
-    """
-
-    places: tuple[str, ...]
-    probability: Floats
-    word: str
-    selected: bool
-    unknown: float | None = None
-
-    @property
-    def best(self) -> str:
-        """The most probable place, the first in order where several are; "unknown" if that is above 1/2."""
-        if self.unknown is not None and self.unknown > 0.5:
-            return UNKNOWN
-        return self.places[int(np.argmax(self.probability))]
-
-    def as_dict(self) -> dict[str, float]:
-        """Place -> probability."""
-        return dict(zip(self.places, self.probability.tolist(), strict=True))
-
-
 class _Decoded(NamedTuple):
-    """Of n frames: beliefs (n, C), the place of each (n,), what is unknown (n,) or empty; words nobody explains."""
+    """Of n frames: beliefs (n, C), the place of each (n,), what is unknown (n,) or empty; words of probability 0."""
 
     belief: Floats
     best: Ints
     unknown: Floats
-    unexplained: int
+    zero_likelihood_words: int
 
 
-class Recognizer:
+class Recognizer(SequenceDecoder):
     """The HOHMM filter over the language models of places, on-line and in constant memory.
 
     `models`: one BackoffModel per place, all of the same words. `selection` is that of their training. `transition`:
     how the place changes (default: the paper's). `dictionary` turns images into words, for `update` with images.
     `max_gap`: more seconds than this between two frames begin a new sequence. `emissions`: what gives the words'
     probabilities, in place of the models. `calibration`: applied to the beliefs in places. `unknown`: what a place that
-    is none of them is weighed with; None: nobody asks. Raises ModelError if the models do not list the same words, or
-    the transitions are between more or fewer places.
+    is none of them is weighed with; None: nobody asks. `explain`: keep the models and the last words, so that `explain`
+    can tell what decided. Raises ModelError if the models do not list the same words, or the transitions are between
+    more or fewer places.
     """
+
+    _SETTINGS = ("selection", "transition", "dictionary", "max_gap", "emissions", "calibration", "unknown")
+    _NEEDING = "transitions per second and the largest gap need"
 
     def __init__(
         self,
@@ -87,81 +67,101 @@ class Recognizer:
         emissions: Emissions | None = None,
         calibration: Calibration | None = None,
         unknown: UnknownModel | None = None,
+        explain: bool = False,
     ) -> None:
         if not models:
             raise ModelError("a recognizer needs the model of at least one place")
-        self.places = tuple(models)
-        self.selection = selection
-        self.transition = transition or fixed_transition(len(models))
-        if len(self.transition.matrix) != len(models):
-            raise ModelError(f"transitions between {len(self.transition.matrix)} places for {len(models)} models")
-        self.dictionary = dictionary
-        self.max_gap = max_gap
-        self._words = common_words(models)
-        self.emissions = emissions or unite_models(list(models.values()))
-        self.calibration = calibration
-        self.unknown = unknown
-        self._filter = OnlineFilter(self.transition, [1 / len(models)] * len(models))
-        self._chain = OnlineFilter(new_place.CHAIN, new_place.prior(len(models)))
-        self.unexplained = 0
-        self.reset()
+        self.transition: Final = transition or fixed_transition(len(models))
+        words = common_words(models)
+        self.emissions: Final = emissions or unite_models(list(models.values()))
+        self.calibration: Final = calibration
+        self.unknown: Final = unknown
+        self._models = models if explain else None
+        super().__init__(models, words, selection=selection, dictionary=dictionary, max_gap=max_gap)
 
-    def __contains__(self, word: str) -> bool:
-        return word in self._words
+    def _settings(self) -> str:
+        return f"transitions per {self._per}, {super()._settings()}"
 
-    def reset(self) -> None:
-        """Forget the sequence so far: uniform belief, empty history."""
+    def _restart(self) -> None:
+        C = len(self.places)
+        if len(self.transition.matrix) != C:
+            raise ModelError(f"transitions between {len(self.transition.matrix)} places for {C} models")
+        self._filter = OnlineFilter(self.transition, [1 / C] * C)
+        self._chain = OnlineFilter(new_place.CHAIN, new_place.prior(C))
+        super()._restart()
+
+    def _begin(self) -> tuple[Posterior, TakeIn]:
         self._filter.reset()
         self._chain.reset()
         self._score = self.emissions.follow()
-        self._keep = selector(self.selection)
-        self._frame = 0
-        self._time: float | None = None
-        # Frame and time of the last update; None before the first.
-        self._updated: tuple[int, float | None] | None = None
+        self._taken_in: deque[TakenIn] = deque(maxlen=WINDOW)
+        return self._posterior(True), self._take_in
 
-    def update(
-        self, word_or_image: "str | NDArray[Any]", time: float | None = None, distance: float | None = None
-    ) -> Belief:
-        """The belief after one more frame: its word, or its image (h, w) grey 0..255 if there is a dictionary.
+    @property
+    def _per(self) -> str:
+        return self.transition.per
 
-        `time` in seconds: needed with a largest gap and with transitions per second. `distance` of a word, from the
-        descriptor to its unit: evidence for a place that is unknown; that of an image comes from the dictionary. A word
-        that the selection skips leaves the belief as it is (readings A16). Raises ModelError for a word that the models
-        do not list, for an image without a dictionary, and for a time that is needed and missing, or goes back; nothing
-        has changed then.
-        """
-        if isinstance(word_or_image, str):
-            word = word_or_image
-        else:
-            word, distance = self._see(word_or_image)
-        if word not in self._words:
-            raise ModelError(f"the word {word!r} is not in the models' vocabulary")
-        self._pass(time, needed=self._needs_times)
-        selected = self._keep(word)
-        if selected:
-            steps = self._steps()
-            if steps is not None:
-                self._filter.predict(steps)
-            log10_p = self._score(word)
-            if self.unknown is not None:
-                self._weigh_unknown(self.unknown, log10_p, steps, distance)
-            self.unexplained += not self._filter.weigh(log10_p)
-            self._updated = self._frame, self._time
-        return self.belief(word, selected)
+    def _take_in(self, word: str, steps: float | None, distance: float | None) -> Posterior:
+        if steps is not None:
+            self._filter.predict(steps)
+        log10_p = self._score(word)
+        news = None
+        if self.unknown is not None:
+            news = self._weigh_unknown(self.unknown, log10_p, steps, distance)
+        before = self._filter.belief() if self._models else None
+        posterior = self._posterior(self._filter.weigh(log10_p))
+        if before is not None:
+            after = self._filter.belief()
+            frame, time = self._now.frame - 1, self._now.time
+            self._taken_in.append(TakenIn(frame, time, word, steps or 0.0, np.array(log10_p), before, after, news))
+        return posterior
 
-    def skip(self, time: float | None = None) -> Belief:
-        """The belief after one more frame that has no word: it is held, but the frame and its time count."""
-        self._pass(time, needed=False)
-        return self.belief()
-
-    def belief(self, word: str = "", selected: bool = False) -> Belief:
-        """The belief as it stands."""
-        probability = self._probabilities()
+    def _posterior(self, possible: bool) -> Posterior:
+        probability = self._filter.belief()
         if self.calibration is not None:
             probability = self.calibration.apply(probability)
         unknown = None if self.unknown is None else math.exp(self._chain.log_belief[0])
-        return Belief(self.places, probability, word, selected, unknown)
+        return Posterior(probability, unknown, possible)
+
+    def _weigh_unknown(
+        self, model: UnknownModel, log10_p: Sequence[float], steps: float | None, distance: float | None
+    ) -> Floats:
+        """Take in a word as evidence for a place that is unknown; the filter is at its prediction.
+
+        What the word says of that, log10, and its probability before and after, float64 (3,).
+        """
+        if steps is not None:
+            self._chain.predict(steps)
+        far = np.array([math.nan if distance is None else distance])
+        (ratio,) = new_place.evidence(model, np.array([log10_p]), self._filter.belief()[None], far).tolist()
+        before = self._chain.log_belief[0]
+        self._chain.weigh([ratio / LN10, 0.0])
+        return np.array([ratio / LN10, math.exp(before), math.exp(self._chain.log_belief[0])])
+
+    def explain(self) -> Decision:
+        """What decided after the last selected word, as plain data: a line of NAME.explain.jsonl (docs/files.md).
+
+        `frame` is the number of the frame since the sequence began, from 0. Raises ModelError before the first selected
+        word, and for a recognizer that was not made to explain.
+        """
+        if self._models is None:
+            raise ModelError(
+                "this recognizer keeps nothing to explain with; make it with explain=True, or load it with "
+                "load_recognizer(..., options=Decoding(explain=True))"
+            )
+        if not self._taken_in:
+            raise ModelError("no word was selected yet, so that there is nothing to explain")
+        return explain_last(self._taken_in, self._models, self.transition)
+
+    def explain_stream(self, stream: WordStream) -> Iterator[Decision]:
+        """For each selected frame of a whole sequence what `explain` tells; ModelError as there.
+
+        The beliefs are the filter's own, before any calibration.
+        """
+        if self._models is None:
+            raise ModelError("this recognizer keeps nothing to explain with; make it with explain=True")
+        for part in self.evidence(stream):
+            yield from explain_part(part, stream, self._models, self.transition, self.unknown)
 
     def decode(
         self, stream: WordStream, *, smooth: bool = False, viterbi: bool = False, lag: int | None = None
@@ -171,14 +171,14 @@ class Recognizer:
         `smooth`, `lag`: see `believe`; later words count. `viterbi`: `best` is the most probable path. Words that the
         models do not list are skipped as `skip` does, and counted in a warning. Raises StreamError as `evidence_in`.
         """
-        warn_of_strange_words(stream, self._words)
+        warn_of_unlisted(stream, self)
         parts = list(self.evidence(stream))
         decoded = [self._decoded(part, stream, smooth=smooth, viterbi=viterbi, lag=lag) for part in parts]
         if len(parts) > 1:
             log.info("%s: gaps of more than %g s: %d", stream.name, self.max_gap, len(parts) - 1)
-        unexplained = sum(part.unexplained for part in decoded)
-        if unexplained:
-            log.warning("%s: words that no place explains: %d left the prediction as it was", stream.name, unexplained)
+        never = sum(part.zero_likelihood_words for part in decoded)
+        if never:
+            log.warning("%s: words that no place explains: %d left the prediction as it was", stream.name, never)
         unknown = None if self.unknown is None else np.concatenate([part.unknown for part in decoded])
         return Beliefs.of(
             stream,
@@ -192,16 +192,11 @@ class Recognizer:
     def evidence(self, stream: WordStream) -> Iterator[Evidence]:
         """What a sequence says of the places, in parts that gaps end; words that the models do not list say nothing."""
         return evidence_in(
-            stream,
-            self.emissions,
-            self._words,
-            selection=self.selection,
-            per=self.transition.per,
-            max_gap=self.max_gap,
+            stream, self.emissions, self._words, selection=self.selection, per=self._per, max_gap=self.max_gap
         )
 
     def _decoded(self, part: Evidence, stream: WordStream, *, smooth: bool, viterbi: bool, lag: int | None) -> _Decoded:
-        belief, unexplained = believe(part, self.transition, smooth=smooth, lag=lag)
+        belief, never = believe(part, self.transition, smooth=smooth, lag=lag)
         best = most_probable_path(part, self.transition) if viterbi else belief.argmax(axis=1)
         if self.calibration is not None:
             belief = self.calibration.apply(belief)
@@ -209,62 +204,4 @@ class Recognizer:
         if self.unknown is not None:
             far = stream.distances[part.at]
             unknown = believe_unknown(part, self.transition, self.unknown, far, smooth=smooth, lag=lag)
-        return _Decoded(belief, best, unknown, unexplained)
-
-    @property
-    def _needs_times(self) -> bool:
-        return self.max_gap is not None or self.transition.per == "second"
-
-    def _pass(self, time: float | None, *, needed: bool) -> None:
-        """Take note of one more frame; after a gap everything starts anew."""
-        known = time is not None and not math.isnan(time)
-        if needed and not known:
-            raise ModelError("the frame has no time, which transitions per second and the largest gap need")
-        if time is not None and known:
-            if self._needs_times and self._time is not None and time < self._time:
-                raise ModelError(f"time goes back from {self._time:.6f} to {time:.6f} s")
-            if self.max_gap is not None and self._time is not None and time - self._time > self.max_gap:
-                log.info("%g s without a frame: a new sequence begins", time - self._time)
-                self.reset()
-            self._time = time
-        self._frame += 1
-
-    def _steps(self) -> float | None:
-        """Steps of the transitions since the last update, None before the first."""
-        if self._updated is None:
-            return None
-        frame, time = self._updated
-        if self.transition.per == "frame":
-            return self._frame - frame
-        if self.transition.per == "second" and self._time is not None and time is not None:
-            return self._time - time
-        return 1.0
-
-    def _weigh_unknown(
-        self, model: UnknownModel, log10_p: Sequence[float], steps: float | None, distance: float | None
-    ) -> None:
-        """Take in a word as evidence for a place that is unknown; the filter is at its prediction."""
-        if steps is not None:
-            self._chain.predict(steps)
-        far = np.array([math.nan if distance is None else distance])
-        (ratio,) = new_place.evidence(model, np.array([log10_p]), self._probabilities()[None], far).tolist()
-        self._chain.weigh([ratio / LN10, 0.0])
-
-    def _probabilities(self) -> Floats:
-        """The filter's own belief (C,)."""
-        probability = np.array([math.exp(b) for b in self._filter.log_belief])
-        normal: Floats = probability / probability.sum()
-        return normal
-
-    def _see(self, image: NDArray[Any]) -> tuple[str, float]:
-        if self.dictionary is None:
-            raise ModelError("an image needs a dictionary to become a word; give the recognizer the words.npz")
-        return self.dictionary.look(image)
-
-
-def warn_of_strange_words(stream: WordStream, known: Container[str]) -> None:
-    """Say how many words of a stream are not `known`, if any."""
-    strange = [word for word in stream.words if word not in known]
-    if strange:
-        message = "%s: words that the models do not list: %d skipped, %r first"
-        log.warning(message, stream.name, len(strange), strange[0])
+        return _Decoded(belief, best, unknown, never)

@@ -35,6 +35,9 @@ class Transition:
                 "is at least 1 / the number of places, or transitions per update or frame"
             )
 
+    def __repr__(self) -> str:
+        return f"Transition({len(self.matrix)} places, per {self.per})"
+
     def over(self, steps: float) -> Floats:
         """The matrix (C, C) of `steps` steps >= 0: the power of `matrix`; whole numbers only without `change`."""
         if steps == 1:

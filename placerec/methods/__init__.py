@@ -1,21 +1,40 @@
-"""The systems that the paper names, each as one short module, on the same words."""
+"""The systems that turn words into beliefs: the paper's, and those that it names, each as one short module."""
 
-from placerec.methods.decode import check_method, decode, load_decoder, make_decoder
-from placerec.methods.follower import Follower
-from placerec.methods.methods import HOHMM, METHODS, NEED_DESCRIPTORS, Method
-from placerec.methods.training_set import MakeStepper, StepFunction, TrainingSet, make_training_set, read_training_set
+from placerec.methods.decode import decode, decode_lines
+from placerec.methods.decoders import (
+    HOHMM,
+    METHODS,
+    NEED_DESCRIPTORS,
+    Method,
+    StepDecoder,
+    check_method,
+    load_decoder,
+    make_decoder,
+)
+from placerec.methods.live import LiveReport, decode_live, follow_live
+from placerec.methods.training_set import (
+    MakeStepper,
+    StepFunction,
+    TrainingSet,
+    make_training_set,
+    read_training_set,
+)
 
 __all__ = [
     "HOHMM",
     "METHODS",
     "NEED_DESCRIPTORS",
-    "Follower",
+    "LiveReport",
     "MakeStepper",
     "Method",
+    "StepDecoder",
     "StepFunction",
     "TrainingSet",
     "check_method",
     "decode",
+    "decode_lines",
+    "decode_live",
+    "follow_live",
     "load_decoder",
     "make_decoder",
     "make_training_set",

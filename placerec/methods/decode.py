@@ -1,81 +1,37 @@
-"""`decode --method`: any system in the place of the models' filter, from the same MODEL/ folder."""
+"""Decoding: token streams, images or lines of words in, beliefs out."""
 
-from collections.abc import Sequence
-from dataclasses import fields
-from functools import partial
+import json
+import logging
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from placerec.errors import ModelError
+from placerec.errors import ModelError, OutputError, StreamError, at
+from placerec.files import whole_folder, write_text
 from placerec.frames import Reading
-from placerec.hohmm import Beliefs
+from placerec.hohmm import (
+    Belief,
+    BeliefRow,
+    Beliefs,
+    Recognizer,
+    SequenceDecoder,
+    format_beliefs,
+    format_header,
+    format_json_row,
+    format_row,
+)
+from placerec.hohmm.explain import EXPLAINED
 from placerec.jobs import Progress
-from placerec.methods.follower import Follower
-from placerec.methods.methods import HOHMM, METHODS, NEED_DESCRIPTORS
-from placerec.methods.training_set import read_training_set
-from placerec.model import Decoder, Decoding, PlaceModels, load_model, make_recognizer
-from placerec.model import decode as decode_with
+from placerec.methods.decoders import HOHMM, make_decoder
+from placerec.model import Decoding, load_model
+from placerec.model.corpus import STREAM_SUFFIXES
 from placerec.model.decoding import PAPER
-from placerec.model.recognize import check_words
+from placerec.model.recognize import token_streams
+from placerec.words import WordStream
 
-if TYPE_CHECKING:
-    from placerec.vision import Dictionary
-
-
-def check_method(name: str, options: Decoding = PAPER, *, scorer: str = "native") -> None:
-    """Raise ModelError if there is no method of this name for words alone, or if the options say nothing to it."""
-    if name in NEED_DESCRIPTORS:
-        raise ModelError(f"{name} needs descriptors, not words alone; `placerec compare` runs it")
-    if name not in METHODS:
-        raise ModelError(f"method {name!r} is unknown; choose one of {', '.join(METHODS)}")
-    if name == HOHMM:
-        return
-    if scorer != "native":
-        raise ModelError(f"{name} has no use for another scorer of the language models; leave it out")
-    method, allowed = METHODS[name], {"max_gap"}
-    if method.emissions is not None:
-        allowed = {field.name for field in fields(options)} - {"calibrated", "explain"}
-    elif method.fit_with_unknown is not None:
-        allowed.add("unknown")
-    for field in fields(options):
-        if field.name not in allowed and getattr(options, field.name) != field.default:
-            raise ModelError(f"{name} has no use for {field.name.replace('_', '-')}; leave it out")
-
-
-def make_decoder(
-    name: str,
-    model: PlaceModels,
-    *,
-    options: Decoding = PAPER,
-    dictionary: "Dictionary | None" = None,
-    scorer: str = "native",
-) -> Decoder:
-    """What decodes by the method `name`, on-line or a sequence at a time; for `hohmm` this is `make_recognizer`.
-
-    Systems that have emissions of their own go through the same filter, with the transitions of `options`. Raises
-    ModelError as `check_method`, `read_training_set` and `make_recognizer` do.
-    """
-    check_method(name, options, scorer=scorer)
-    method = METHODS[name]
-    fit = method.fit_with_unknown if options.unknown and method.fit_with_unknown else method.fit
-    if fit is None:
-        emissions = method.emissions and method.emissions(read_training_set(model))
-        return make_recognizer(model, options=options, dictionary=dictionary, scorer=scorer, emissions=emissions)
-    check_words(model, dictionary)
-    training = read_training_set(model)
-    return Follower(
-        training.places,
-        training.vocabulary,
-        fit(training),
-        selection=model.selection,
-        max_gap=options.max_gap,
-        unknown=options.unknown,
-    )
-
-
-def load_decoder(name: str, path: Path | str, *, options: Decoding = PAPER, scorer: str = "native") -> Decoder:
-    """What `make_decoder` gives for a MODEL/ folder."""
-    return make_decoder(name, load_model(path), options=options, scorer=scorer)
+OWNED = ("*.tsv", "*.jsonl")
+log = logging.getLogger(__name__)
 
 
 def decode(
@@ -91,16 +47,118 @@ def decode(
     as_json: bool = False,
     progress: Progress | None = None,
 ) -> list[Beliefs]:
-    """`placerec decode`: as `placerec.model.decode`, by the `method` of that name (METHODS)."""
-    return decode_with(
-        sources,
-        model,
-        words=words,
-        out=out,
-        reading=reading,
-        options=options,
-        scorer=scorer,
-        as_json=as_json,
-        progress=progress,
-        make=partial(make_decoder, method),
-    )
+    """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
+
+    `sources`: token streams, or image sources (`reading`) if `words` (a words.npz) is given. Without `out` there must
+    be one sequence only; explanations are written there, as NAME.explain.jsonl. `method`: one of `METHODS`. Raises
+    ModelError or StreamError for what cannot be read or does not belong together.
+    """
+
+    def opened() -> tuple[SequenceDecoder, list[WordStream]]:
+        models = load_model(model)
+        if words is None:
+            return make_decoder(method, models, options=options, scorer=scorer), token_streams(sources, models)
+        # Only images need OpenCV and scipy.
+        from placerec.vision import Dictionary
+        from placerec.words.tokenize import streams_of
+
+        for source in sources:
+            if str(source).endswith(STREAM_SUFFIXES):
+                raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
+        dictionary = Dictionary.load(words)
+        decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
+        return decoder, streams_of(sources, dictionary, reading=reading, progress=progress)
+
+    if out is None:
+        if options.explain:
+            raise ModelError("explanations are files: name a folder for them with -o")
+        decoder, streams = opened()
+        if len(streams) > 1:
+            raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
+        return [_decoded(decoder, stream, options) for stream in streams]
+    _spare_sources(sources, Path(out))
+    found = []
+    with whole_folder(Path(out), OWNED) as folder:
+        decoder, streams = opened()
+        for stream in streams:
+            beliefs = _decoded(decoder, stream, options)
+            suffix = "jsonl" if as_json else "tsv"
+            write_text(folder / f"{stream.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
+            if options.explain and isinstance(decoder, Recognizer):
+                decisions = (json.dumps(one, ensure_ascii=False) + "\n" for one in decoder.explain_stream(stream))
+                write_text(folder / f"{stream.name}{EXPLAINED}", "".join(decisions))
+            found.append(beliefs)
+    log.info("%s: %d sequences, %d frames", out, len(found), sum(len(beliefs) for beliefs in found))
+    return found
+
+
+def _decoded(decoder: SequenceDecoder, stream: WordStream, options: Decoding) -> Beliefs:
+    # Other methods were checked to be asked for nothing of it.
+    if isinstance(decoder, Recognizer):
+        return decoder.decode(stream, smooth=options.smooth, viterbi=options.viterbi, lag=options.lag)
+    return decoder.decode(stream)
+
+
+def _spare_sources(sources: Sequence[Path | str], out: Path) -> None:
+    """Refuse to write over what is to be read: token streams and beliefs are called alike."""
+    for source in map(Path, sources):
+        if out.resolve() in (source.resolve(), source.resolve().parent):
+            raise OutputError(f"{out}: holds what is to be decoded ({source}); name another folder")
+
+
+def decode_lines(decoder: SequenceDecoder, lines: Iterable[str], *, as_json: bool = False) -> Iterator[str]:
+    """`placerec decode -`: an answer for each line `word [TAB [seconds] [TAB distance]]`, as soon as it is read.
+
+    The TSV header comes before the first line is read. A word that the models do not list holds the belief; the first
+    one and the number of them are logged. Raises StreamError for seconds or a distance that are no number, and for
+    seconds that are needed (`SequenceDecoder.update`) and missing, or go back.
+    """
+    if not as_json:
+        yield format_header(decoder.places, unknown=decoder.asks_unknown)
+    strange = 0
+    for frame, line in enumerate(lines):
+        word, time, distance = _fields(line, frame)
+        known = word in decoder
+        if not known and not strange:
+            log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
+        strange += not known
+        try:
+            belief = decoder.update(word, time, distance) if known else decoder.skip(time)
+        except ModelError as error:
+            raise StreamError(at("<stdin>", frame + 1, str(error))) from error
+        yield format_belief(str(frame), time, "", replace(belief, word=word), as_json=as_json)
+    if strange:
+        log.warning("<stdin>: lines skipped because the models do not list their word: %d", strange)
+    if never := decoder.zero_likelihood_words:
+        log.warning("<stdin>: words that no place explains, which left the prediction: %d", never)
+
+
+def format_belief(frame: str, time: float, place: str, belief: Belief, *, as_json: bool) -> str:
+    """The line of a beliefs file for one frame, its time in seconds and its label, without the line end."""
+    numbers = belief.probability.tolist(), belief.unknown
+    row = BeliefRow(frame, time, place, belief.word, belief.selected, belief.best, *numbers)
+    return format_json_row(belief.places, row) if as_json else format_row(row)
+
+
+def _fields(line: str, frame: int) -> tuple[str, float, float]:
+    """Word, seconds and distance of line `frame` (from 0), nan for what is not there."""
+    if frame == 0:
+        line = line.removeprefix("\ufeff")
+    word, *rest = line.rstrip("\r\n").split("\t")
+    if len(rest) > 2:
+        raise StreamError(at("<stdin>", frame + 1, f"{len(rest) + 1} fields; word, seconds and distance are expected"))
+    seconds, distance = [*rest, "", ""][:2]
+    time = _number(seconds, frame, f"time {seconds!r} is not a number of seconds")
+    return word.strip(), time, _number(distance, frame, f"distance {distance!r} is not a number")
+
+
+def _number(text: str, frame: int, complaint: str) -> float:
+    if not text.strip():
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise StreamError(at("<stdin>", frame + 1, complaint))
+    return value

@@ -2,10 +2,7 @@
 
 from placerec.model.calibrate import calibrate
 from placerec.model.corpus import Corpus, read_corpus
-from placerec.model.decode import decode, decode_lines, format_beliefs
-from placerec.model.decoder import Decoder
 from placerec.model.decoding import Decoding, transition_of
-from placerec.model.live import LiveReport, decode_live, follow_live
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.recognize import load_recognizer, make_recognizer
 from placerec.model.train import Options, estimate_place, parse_min_count, train_lm, train_model
@@ -13,18 +10,11 @@ from placerec.model.update import update
 
 __all__ = [
     "Corpus",
-    "Decoder",
     "Decoding",
-    "LiveReport",
     "Options",
     "PlaceModels",
     "calibrate",
-    "decode",
-    "decode_lines",
-    "decode_live",
     "estimate_place",
-    "follow_live",
-    "format_beliefs",
     "load_model",
     "load_recognizer",
     "make_recognizer",

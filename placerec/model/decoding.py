@@ -67,6 +67,16 @@ class Decoding:
 PAPER = Decoding()
 
 
+def check_online(options: Decoding) -> None:
+    """Raise ModelError for an option that needs later words, where each frame is answered before they are known."""
+    for name in ("smooth", "viterbi", "lag"):
+        if getattr(options, name) not in (False, None):
+            raise ModelError(
+                f"{name} needs later words, and a recognizer answers before they are known; "
+                "give it to `decode`, the recognizer's or the package's"
+            )
+
+
 def transition_of(model: PlaceModels, options: Decoding) -> Transition:
     """The transitions that `options` ask for between the places of `model`.
 

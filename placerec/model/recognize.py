@@ -8,7 +8,7 @@ from placerec.errors import ModelError
 from placerec.hohmm import Emissions, Recognizer, SeparateEmissions
 from placerec.lm.external import kenlm_scorer
 from placerec.model.corpus import check_dictionary, read_streams, stream_files
-from placerec.model.decoding import PAPER, Decoding, transition_of
+from placerec.model.decoding import PAPER, Decoding, check_online, transition_of
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.trust import calibration_of, unknown_model_of
 from placerec.words import WordStream
@@ -28,9 +28,10 @@ def load_recognizer(
 
     `options`: its transitions, what ends a sequence, and what else is asked of it. `dictionary`: what turns images into
     words. `scorer`: `native`, or `kenlm` (MissingExtraError where it is not installed). Raises ModelError if the
-    dictionary is not the one that made the training words, and as `transition_of`, `calibration_of` and
-    `unknown_model_of` do.
+    dictionary is not the one that made the training words, for options that need later words (give them to the
+    recognizer's `decode`), and as `transition_of`, `calibration_of` and `unknown_model_of` do.
     """
+    check_online(options)
     return make_recognizer(load_model(path), options=options, dictionary=dictionary, scorer=scorer)
 
 
@@ -55,6 +56,7 @@ def make_recognizer(
         emissions=_kenlm(model) if scorer == "kenlm" else emissions,
         calibration=calibration_of(model, options) if options.calibrated else None,
         unknown=unknown_model_of(model) if options.unknown else None,
+        explain=options.explain,
     )
 
 

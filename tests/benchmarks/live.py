@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from placerec.frames.image import read_gray
 from placerec.hohmm import Recognizer
+from placerec.methods.decode import format_belief
 from placerec.model import load_recognizer, train_lm
-from placerec.model.decode import format_line
 from placerec.vision import Dictionary
 from placerec.vision.gist import gist
 from placerec.vision.images import fit_image
@@ -78,8 +78,7 @@ def stages(path: Path, dictionary: Dictionary, recognizer: Recognizer) -> list[f
     moments.append(clock())
     belief = recognizer.update(word, None, float(distance))
     moments.append(clock())
-    row = "", word, belief.selected, belief.best, belief.probability.tolist()
-    format_line(recognizer.places, path.name, 0.0, *row, None, as_json=False)
+    format_belief(path.name, 0.0, "", belief, as_json=False)
     moments.append(clock())
     return [after - before for before, after in pairwise(moments)]
 

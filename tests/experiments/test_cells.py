@@ -14,7 +14,8 @@ from placerec.experiments.grid.cells import CellJob, GridCell, believe_cell, des
 from placerec.experiments.grid.run import run_grid
 from placerec.figures import evaluate_files
 from placerec.hohmm import Beliefs, read_beliefs
-from placerec.model import Decoding, Options, decode, train_lm
+from placerec.methods import decode
+from placerec.model import Decoding, Options, train_lm
 from placerec.words import WordStream, parse_selection
 
 TRANSITIONS = {"fixed": Decoding(stay=0.9, per="frame"), "learned": Decoding(transition="learned")}

@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 from placerec.errors import EvaluationError, OutputError
 from placerec.hohmm.beliefs import (
     COLUMNS,
+    BeliefRow,
     Beliefs,
     format_header,
     format_row,
@@ -38,9 +39,9 @@ def same(left: Beliefs, right: Beliefs) -> None:
 
 def test_the_lines_are_those_of_the_contract() -> None:
     assert format_header(["kitchen", "office"]) == HEADER
-    assert format_row("t1.jpeg", 0.5, "kitchen", "w07", True, "office", [0.25, 0.75]) == ROW
+    assert format_row(BeliefRow("t1.jpeg", 0.5, "kitchen", "w07", True, "office", [0.25, 0.75])) == ROW
     assert (
-        format_row("0", float("nan"), "", "w7", False, "a", [1 / 3, 2 / 3])
+        format_row(BeliefRow("0", float("nan"), "", "w7", False, "a", [1 / 3, 2 / 3]))
         == "0\t\t\tw7\t0\ta\t0.333333333\t0.666666667"
     )
 
@@ -57,7 +58,7 @@ def test_the_lines_are_those_of_the_contract() -> None:
     ],
 )
 def test_times_are_written_to_the_microsecond_without_exponent(seconds: float, text: str) -> None:
-    assert format_row("f", seconds, "", "w", True, "a", [1.0]).split("\t")[1] == text
+    assert format_row(BeliefRow("f", seconds, "", "w", True, "a", [1.0])).split("\t")[1] == text
 
 
 def test_beliefs_are_told_in_a_line() -> None:
@@ -69,14 +70,14 @@ def test_beliefs_are_told_in_a_line() -> None:
 
 
 def test_a_very_small_belief_keeps_its_exponent() -> None:
-    assert format_row("f", 0.0, "", "w", True, "a", [1.23456789e-30]).endswith("\t1.23456789e-30")
+    assert format_row(BeliefRow("f", 0.0, "", "w", True, "a", [1.23456789e-30])).endswith("\t1.23456789e-30")
 
 
 def test_a_tab_in_a_text_is_refused_when_writing() -> None:
     with pytest.raises(
         OutputError, match=r"^'a\\tb' holds a tab or a line end, which a beliefs file cannot hold; rename it$"
     ):
-        format_row("a\tb", 0.0, "", "w", True, "a", [1.0])
+        format_row(BeliefRow("a\tb", 0.0, "", "w", True, "a", [1.0]))
     with pytest.raises(OutputError, match="holds a tab or a line end"):
         format_header(["kitchen\n"])
 

@@ -73,6 +73,11 @@ def test_beliefs_of_0_and_1_are_fitted() -> None:
     assert found.apply(sure)[0] == pytest.approx([0.8, 0.2], abs=0.01)
 
 
+def test_many_places_at_a_low_temperature_stay_probabilities() -> None:
+    even = np.full(200, 1 / 200)
+    assert Calibration(0.01, 1, 0.0, 0.0).apply(even) == pytest.approx(even)
+
+
 def test_a_few_frames_that_are_right_make_nobody_infinitely_sure() -> None:
     found = fit_calibration(np.array([[0.9, 0.1]] * 3), np.zeros(3, np.int64))
     assert 0.5 < found.temperature < 1

@@ -10,28 +10,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_recognizer import WORDS, models_of, novelty, selections
 
+from placerec.errors import ModelError
 from placerec.hohmm import Recognizer, Transition, explain, filter_stream, fixed_transition
 from placerec.hohmm.evidence import Evidence
-from placerec.hohmm.explain import WINDOW, contributions, explain_stream
+from placerec.hohmm.explain import WINDOW, contributions
 from placerec.hohmm.motion import predict_beliefs
-from placerec.lm import BackoffModel
 from placerec.words import Selection, WordStream
 
 CORPUS = [[["a", "b", "a", "b", "b"]], [["c", "d", "c"]], [["a", "d"], ["b"]]]
-
-
-def explained(recognizer: Recognizer, models: dict[str, BackoffModel], stream: WordStream) -> list[dict[str, Any]]:
-    return list(explain_stream(recognizer, models, stream))
 
 
 @settings(max_examples=30)
 @given(st.lists(st.sampled_from(WORDS), min_size=1, max_size=30), st.integers(1, 4), selections)
 def test_the_numbers_are_those_of_the_filter_and_the_models(words: list[str], order: int, selection: Selection) -> None:
     models = models_of(CORPUS, order)
-    recognizer = Recognizer(models, selection=selection)
+    recognizer = Recognizer(models, explain=True, selection=selection)
     stream = WordStream.of("run", words)
     beliefs = recognizer.decode(stream)
-    found = explained(recognizer, models, stream)
+    found = list(recognizer.explain_stream(stream))
     at = np.flatnonzero(beliefs.selected).tolist()
     assert [one["frame"] for one in found] == [beliefs.frames[i] for i in at]
     before = [1 / 3] * 3
@@ -116,14 +112,14 @@ def test_contributions_are_finite_whatever_is_impossible(case: Any) -> None:
 
 def test_words_argue_once_each_the_strongest_first() -> None:
     models = models_of(CORPUS, 1)
-    recognizer = Recognizer(models)
-    last = explained(recognizer, models, WordStream.of("run", ["a", "b", "c", "a", "b"]))[-1]
+    recognizer = Recognizer(models, explain=True)
+    last = list(recognizer.explain_stream(WordStream.of("run", ["a", "b", "c", "a", "b"])))[-1]
     assert (last["best"], last["rival"]) == ("place0", "place2")
     found = {side: [(one["word"], one["frames"]) for one in last[side]] for side in ("for", "against")}
     assert found["for"] == [("b", ["1", "4"]), ("a", ["0", "3"])]
     strengths = [one["log10_odds"] for one in last["for"]]
     assert strengths == sorted(strengths, reverse=True)
-    turned = explained(recognizer, models, WordStream.of("run", ["a", "a", "c", "c", "d"]))[-1]
+    turned = list(recognizer.explain_stream(WordStream.of("run", ["a", "a", "c", "c", "d"])))[-1]
     assert turned["best"] == "place1"
     assert turned["for"][0]["word"] == "c"
     assert [one["word"] for one in turned["against"]] == ["a"]
@@ -132,16 +128,16 @@ def test_words_argue_once_each_the_strongest_first() -> None:
 
 def test_one_place_has_no_rival() -> None:
     models = models_of(CORPUS[:1], 2)
-    (only,) = explained(Recognizer(models), models, WordStream.of("run", ["a"]))
+    (only,) = list(Recognizer(models, explain=True).explain_stream(WordStream.of("run", ["a"])))
     assert (only["rival"], only["for"], only["against"]) == (None, [], [])
 
 
 def test_what_speaks_for_a_new_place_is_told_too() -> None:
     models = models_of(CORPUS, 2)
-    recognizer = Recognizer(models, unknown=novelty(3))
+    recognizer = Recognizer(models, explain=True, unknown=novelty(3))
     stream = WordStream.of("run", ["a", "b", "c"], distances=[0.5, 9.0, np.nan])
     unknown = recognizer.decode(stream).unknown
-    found = [one["unknown"] for one in explained(recognizer, models, stream)]
+    found = [one["unknown"] for one in list(recognizer.explain_stream(stream))]
     assert [one["after"] for one in found] == pytest.approx(unknown, rel=1e-5)
     assert found[0]["before"] == pytest.approx(1 / 4)
     for one in found:
@@ -153,8 +149,41 @@ def test_what_speaks_for_a_new_place_is_told_too() -> None:
 def test_a_sequence_without_a_listed_word_decides_nothing() -> None:
     models = models_of(CORPUS, 2)
     for transition in (fixed_transition(3), Transition(np.full((3, 3), 1 / 3))):
-        recognizer = Recognizer(models, transition=transition, unknown=novelty(3))
+        recognizer = Recognizer(models, explain=True, transition=transition, unknown=novelty(3))
         stream = WordStream.of("run", ["zebra", "zebra"])
-        assert explained(recognizer, models, stream) == []
+        assert list(recognizer.explain_stream(stream)) == []
         assert recognizer.decode(stream).unknown == pytest.approx([0.25, 0.25])
         assert recognizer.decode(stream, smooth=True).unknown == pytest.approx([0.25, 0.25])
+
+
+@given(st.lists(st.sampled_from([*WORDS, "unlisted"]), max_size=60), st.integers(1, 3), selections, st.booleans())
+def test_a_robot_is_told_what_a_recording_is_told(
+    words: list[str], order: int, selection: Selection, asks_unknown: bool
+) -> None:
+    unknown = novelty(3) if asks_unknown else None
+    recognizer = Recognizer(models_of(CORPUS, order), selection=selection, unknown=unknown, explain=True)
+    stream = WordStream.of("run", words, times=np.arange(len(words)) / 4, distances=np.arange(len(words)) % 3 / 2)
+    expected = {one["frame"]: one for one in recognizer.explain_stream(stream)}
+    for frame, time, word, distance in zip(stream.frames, stream.times, words, stream.distances, strict=True):
+        belief = recognizer.update(word, time, distance) if word in recognizer else recognizer.skip(time)
+        if belief.selected:
+            found, told = recognizer.explain(), expected.pop(frame)
+            for one in (found, told):
+                numbers = [[row.pop(name) for name in ("log10_p", "before", "after")] for row in one["places"].values()]
+                numbers += [[*one.pop("unknown", {}).values()]]
+                numbers += [[argument.pop("log10_odds") for argument in (*one["for"], *one["against"])]]
+                one["numbers"] = [number for row in numbers for number in row]
+            assert found.pop("numbers") == pytest.approx(told.pop("numbers"), rel=1e-4, abs=1e-5)
+            assert found == told
+    assert not expected
+
+
+def test_who_keeps_nothing_cannot_explain() -> None:
+    models = models_of(CORPUS, 2)
+    with pytest.raises(ModelError, match=r"^no word was selected yet"):
+        Recognizer(models, explain=True).explain()
+    recognizer = Recognizer(models)
+    recognizer.update("a")
+    for ask in (recognizer.explain, lambda: next(recognizer.explain_stream(WordStream.of("run", ["a"])))):
+        with pytest.raises(ModelError, match=r"^this recognizer keeps nothing to explain with; make it with explain="):
+            ask()

@@ -2,7 +2,10 @@
 
 import logging
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +16,11 @@ from hypothesis import strategies as st
 from placerec import reference
 from placerec.errors import ModelError, StreamError
 from placerec.hohmm import (
+    Belief,
     Calibration,
     Recognizer,
     SeparateEmissions,
+    SequenceDecoder,
     Transition,
     fixed_transition,
     learned_transition,
@@ -342,3 +347,62 @@ def test_memory_does_not_grow_with_the_stream(monkeypatch: pytest.MonkeyPatch) -
     for i in range(40):
         found.update(WORDS[i % 4], i**2 / 7)
         assert len(found._filter._predictors) <= 5
+
+
+def test_what_decides_cannot_be_assigned_but_changed_in_a_copy() -> None:
+    """Once assigned, the transitions were those of `decode`, and `update` went on with the former ones."""
+    models = models_of([[["a", "b", "b"]], [["c", "a"]]], 2)
+    recognizer = Recognizer(models)
+    stream = timed(["a", "c", "b", "a"], [0, 1, 2, 30])
+    for name in ("places", "selection", "transition", "dictionary", "max_gap", "emissions", "calibration", "unknown"):
+        remedy = "" if name == "places" else rf"; changed\({name}=\.\.\.\) gives another one"
+        with pytest.raises(AttributeError, match=rf"^{name} of a Recognizer is fixed{remedy}$"):
+            setattr(recognizer, name, None)
+    recognizer.update("a")
+    settings: list[dict[str, Any]] = [
+        {"transition": fixed_transition(2, 0.6)},
+        {"selection": Selection("subsample", 2), "max_gap": 5.0},
+        {"calibration": FAR, "unknown": novelty(2)},
+        {"emissions": recognizer.changed(transition=fixed_transition(2, 0.7)).emissions},
+    ]
+    for setting in settings:
+        changed, made = recognizer.changed(**setting), Recognizer(models, **setting)
+        expected = made.decode(stream)
+        for found in (changed.decode(stream), SequenceDecoder.decode(changed, stream)):
+            assert found.belief == pytest.approx(expected.belief, abs=1e-14)
+            assert found.unknown == (None if expected.unknown is None else pytest.approx(expected.unknown, abs=1e-12))
+    # The recognizer itself goes on as if nothing had happened.
+    assert np.array_equal(recognizer.belief().probability, Recognizer(models).update("a").probability)
+    with pytest.raises(ModelError, match=r"^transitions between 3 places for 2 models"):
+        recognizer.changed(transition=fixed_transition(3))
+    with pytest.raises(TypeError, match=r"^'models' is no setting of a Recognizer: selection, transition, dict"):
+        recognizer.changed(models=models)
+
+
+@pytest.mark.parametrize("path", ["frame.png", "run/000001", "run\\1", Path("run/frame.JPG")])
+def test_the_path_of_an_image_is_no_word(path: str | Path) -> None:
+    recognizer = Recognizer(models_of([[["a"]], [["c"]]], 2))
+    with pytest.raises(
+        ModelError, match=rf"; for an image, give its grey levels: read_gray\({re.escape(repr(str(path)))}"
+    ):
+        recognizer.update(path)  # type: ignore[arg-type]
+    with pytest.raises(ModelError, match=r"^the word 'frame' is not in the models' vocabulary$"):
+        recognizer.update("frame")
+
+
+def test_the_repr_says_what_it_is_in_one_line() -> None:
+    models = models_of([[["a"]]] * 4, 2)
+    recognizer = Recognizer(models, transition=fixed_transition(4, per="frame"), max_gap=10)
+    assert repr(recognizer) == (
+        "Recognizer(4 places: place0, place1, place2, place3; 4 words; transitions per frame, selection none, "
+        "gaps above 10 s)"
+    )
+    assert repr(recognizer.update("a", 0.0)) == "Belief('place0', 0.25, word='a')"
+    asked = recognizer.changed(unknown=UnknownModel(4, 0.5, None)).update("a", 0.0)
+    assert repr(asked) == f"Belief('place0', 0.25, unknown {asked.unknown:.3g}, word='a')"
+    assert repr(recognizer.transition) == "Transition(4 places, per frame)"
+
+
+@pytest.mark.parametrize(("unknown", "best"), [(None, "a"), (0.5, "a"), (np.nextafter(0.5, 1), "unknown")])
+def test_a_new_place_is_best_above_one_half(unknown: float | None, best: str) -> None:
+    assert Belief(("a", "b"), np.array([0.5, 0.5]), "w", True, unknown).best == best

@@ -18,7 +18,6 @@ from placerec.hohmm import Emissions
 from placerec.methods import TrainingSet, decode, dubois2011, mtd, wu2009
 from placerec.methods.tables import count_pairs
 from placerec.model import Options, train_lm
-from placerec.model import decode as decode_with_models
 
 FITS: tuple[Callable[[TrainingSet], Emissions], ...] = (wu2009.fit, dubois2011.fit, mtd.fit)
 # What an ARPA file keeps of a logarithm.
@@ -82,7 +81,7 @@ def test_wu2009_does_not_depend_on_the_models(tmp_path: Path) -> None:
     runs = [tokens / "run1.tsv", tokens / "run2.tsv"]
     train_lm(runs, tmp_path / "one", options=Options(1, "lidstone-backoff"))
     train_lm(runs, tmp_path / "two", options=Options(2, "witten-bell"))
-    [expected] = decode_with_models([tokens / "run3.tsv"], tmp_path / "one")
+    [expected] = decode([tokens / "run3.tsv"], tmp_path / "one")
     [found] = decode([tokens / "run3.tsv"], tmp_path / "two", method="wu2009")
     np.testing.assert_array_equal(found.belief, expected.belief)
     assert set(found.words) <= set(VOCABULARY)

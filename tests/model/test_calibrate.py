@@ -14,7 +14,8 @@ from helpers.small_world import run_through, with_columns, write_tokens
 from placerec.errors import ModelError, StreamError
 from placerec.evaluation import evaluate
 from placerec.hohmm import Calibration
-from placerec.model import Decoding, calibrate, decode, load_model, train_lm
+from placerec.methods import decode
+from placerec.model import Decoding, calibrate, load_model, train_lm
 from placerec.words import write_stream
 
 STAY_09 = {

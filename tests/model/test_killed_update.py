@@ -44,8 +44,8 @@ def test_the_old_model_or_the_new_one(exchange: str) -> None:
 
 def main(root: Path, exchange: str) -> None:
     write_vocabulary(["a", "b"], root / "vocab.txt")
-    write_stream(WordStream.of("first", "aabba", ["hall", "hall", "hall", "kitchen", "kitchen"]), root / "first.tsv")
-    write_stream(WordStream.of("today", "bba", ["hall"] * 3), root / "today.tsv")
+    write_stream(WordStream.of("first", [*"aabba"], ["hall", "hall", "hall", "kitchen", "kitchen"]), root / "first.tsv")
+    write_stream(WordStream.of("today", [*"bba"], ["hall"] * 3), root / "today.tsv")
     train_lm([root / "first.tsv"], root / "old")
     train_lm([root / "first.tsv", root / "today.tsv"], root / "new")
     if exchange == "moves":

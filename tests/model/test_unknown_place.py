@@ -12,18 +12,9 @@ import pytest
 from helpers.small_world import run_through, write_tokens
 
 from placerec.errors import ModelError, StreamError
-from placerec.hohmm import read_beliefs
-from placerec.model import (
-    Decoding,
-    calibrate,
-    decode,
-    decode_lines,
-    format_beliefs,
-    load_model,
-    load_recognizer,
-    train_lm,
-    update,
-)
+from placerec.hohmm import format_beliefs, read_beliefs
+from placerec.methods import decode, decode_lines
+from placerec.model import Decoding, calibrate, load_model, load_recognizer, train_lm, update
 from placerec.model.trust import unknown_model_of
 from placerec.words import WordStream, read_stream, write_stream
 

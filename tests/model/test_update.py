@@ -66,7 +66,7 @@ def test_learning_and_forgetting_equal_training_on_what_is_left(
     # Hundreds of small files: in memory where there is such a folder.
     with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as name:
         folder = Path(name)
-        write_vocabulary("abcd", folder / "vocab.txt")
+        write_vocabulary([*"abcd"], folder / "vocab.txt")
         runs = [write_run(folder / f"run{i}.tsv", frames) for i, (frames, _) in enumerate(parts)]
         kept = [run for run, (_, later) in zip(runs, parts, strict=True) if not later]
         more = [run for run, (_, later) in zip(runs, parts, strict=True) if later]
@@ -154,7 +154,7 @@ def test_a_place_comes_and_goes_with_its_visits(world: Path, caplog: pytest.LogC
 
 def test_a_place_with_visits_but_no_selected_word_stays(tmp_path: Path) -> None:
     """`unique` over a whole sequence may leave a visit without a word; its place has a model all the same."""
-    write_vocabulary("ab", tmp_path / "vocab.txt")
+    write_vocabulary(["a", "b"], tmp_path / "vocab.txt")
     one = write_run(tmp_path / "one.tsv", [("K", "a", 1, 1), ("L", "a", 1, 1)])
     two = write_run(tmp_path / "two.tsv", [("L", "b", 1, 1)])
     options = Options(select=parse_selection("unique"))

@@ -15,11 +15,11 @@ import numpy as np
 from placerec.arrays import Floats
 from placerec.experiments.comparison.encoded import EncodedSequences
 from placerec.experiments.store import key_of
-from placerec.hohmm import Beliefs, Recognizer
+from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder
 from placerec.lm.union import unite_models
 from placerec.methods import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
 from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
-from placerec.model import Decoder, Decoding, Options, PlaceModels, load_model, train_model, transition_of
+from placerec.model import Decoding, Options, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
 from placerec.words import Selection, place_steps, sentences_per_place
 
@@ -130,7 +130,7 @@ class _Unigrams:
         return lambda word: self._emissions.follow()(word)
 
 
-def _decoded(decoder: Decoder, benchmark: Benchmark) -> MethodRun:
+def _decoded(decoder: SequenceDecoder, benchmark: Benchmark) -> MethodRun:
     def start() -> StepFunction:
         decoder.reset()
         return lambda word: decoder.update(word).probability

@@ -17,9 +17,9 @@ from placerec.evaluation import evaluate
 from placerec.evaluation.metrics import change_latencies, codes, right_frames
 from placerec.experiments.store import load, save
 from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition
+from placerec.hohmm.decoder import warn_of_unlisted
 from placerec.hohmm.evidence import evidence_in
 from placerec.hohmm.offline import believe
-from placerec.hohmm.recognizer import warn_of_strange_words
 from placerec.lm import BackoffModel, NgramCounts, count_ngrams
 from placerec.lm.trie import Trie
 from placerec.lm.union import unite_models
@@ -97,7 +97,7 @@ def _computed(job: CellJob, cells: Sequence[GridCell]) -> dict[str, Any]:
     streams = _read(job, cells)
     listed = frozenset(streams.corpus.vocabulary)
     for stream in streams.tests:
-        warn_of_strange_words(stream, listed)
+        warn_of_unlisted(stream, listed)
     results: dict[str, Any] = {"data": describe_data(streams.training, streams.tests)}
     for smoothing in dict.fromkeys(cell.smoothing for cell in cells):
         results[f"frame-wise {smoothing}"] = _frame_wise(streams, smoothing)

@@ -17,13 +17,12 @@ from placerec.frames import Frame, Reading, Sequence, find_sequences
 from placerec.frames.camera import Camera
 from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt, paced
 from placerec.frames.images import all_images
-from placerec.hohmm import Belief, format_header
+from placerec.hohmm import Belief, SequenceDecoder, format_header
+from placerec.methods.decode import format_belief
+from placerec.methods.decoders import HOHMM, make_decoder
+from placerec.model import load_model
 from placerec.model.corpus import STREAM_SUFFIXES
-from placerec.model.decode import format_line
-from placerec.model.decoder import Decoder
 from placerec.model.decoding import PAPER, Decoding
-from placerec.model.load import load_model
-from placerec.model.recognize import make_recognizer
 
 if TYPE_CHECKING:
     from placerec.vision import Dictionary
@@ -69,16 +68,16 @@ def decode_live(
     model: Path | str,
     *,
     words: Path | str,
+    method: str = HOHMM,
     reading: Reading = Reading(),
     options: Decoding = PAPER,
     scorer: str = "native",
     as_json: bool = False,
-    make: Callable[..., Decoder] = make_recognizer,
 ) -> Generator[str, None, None]:
     """`placerec decode --live`: the lines of a beliefs file, each as soon as its frame has come; TSV with a header.
 
     `source`: a camera, or a sequence whose frames have times, which is played at its own pace. See `follow_live`.
-    `make`: as for `decode`. Raises ModelError for options that look ahead or write files, and StreamError unless
+    `method`: one of `METHODS`. Raises ModelError for options that look ahead or write files, and StreamError unless
     `source` is one sequence of images.
     """
     from placerec.vision import Dictionary
@@ -88,24 +87,23 @@ def decode_live(
     if str(source).endswith(STREAM_SUFFIXES):
         raise StreamError(f"{source}: is a token stream, and live decoding is of images; name a camera or a video")
     dictionary = Dictionary.load(words)
-    decoder = make(load_model(model), options=options, scorer=scorer, dictionary=dictionary)
+    decoder = make_decoder(method, load_model(model), options=options, scorer=scorer, dictionary=dictionary)
     sequences = find_sequences([source], reading=reading, endless=True)
     if len(sequences) > 1:
         raise StreamError(f"{source}: holds {len(sequences)} sequences; name one of them to be played live")
-    header = None if as_json else format_header(decoder.places, unknown=decoder.unknown is not None)
+    header = None if as_json else format_header(decoder.places, unknown=decoder.asks_unknown)
     with closing(follow_live(sequences[0], dictionary, decoder)) as answers:
         for frame, belief in answers:
             if header is not None:
                 yield header
                 header = None
-            row = belief.word, belief.selected, belief.best, belief.probability.tolist(), belief.unknown
-            yield format_line(decoder.places, frame.name, frame.time, frame.place, *row, as_json=as_json)
+            yield format_belief(frame.name, frame.time, frame.place, belief, as_json=as_json)
 
 
 def follow_live(
     sequence: Sequence,
     dictionary: "Dictionary",
-    decoder: Decoder,
+    decoder: SequenceDecoder,
     *,
     tell: Callable[[LiveReport], None] | None = None,
 ) -> Generator[tuple[Frame, Belief], None, None]:
@@ -144,7 +142,7 @@ def _arrivals(sequence: Sequence, stopped: Stopped) -> Iterator[Arrival]:
     return paced(all_images(sequence), stopped)
 
 
-def _believed(arrival: Arrival, dictionary: "Dictionary", decoder: Decoder, tally: "_Tally") -> Belief | None:
+def _believed(arrival: Arrival, dictionary: "Dictionary", decoder: SequenceDecoder, tally: "_Tally") -> Belief | None:
     frame, image = arrival.frame, arrival.image
     try:
         if isinstance(image, str):

@@ -1,28 +1,18 @@
-"""A MODEL/ folder read back, broken ones named, and decoding: files, streams and what they refuse."""
+"""Decoding: files, streams of lines, and what they refuse."""
 
 import io
 import json
-import math
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from helpers.small_world import PLACES, VOCABULARY, write_tokens
+from helpers.small_world import PLACES, write_tokens
 
-from placerec.errors import LanguageModelError, ModelError, OutputError, PlacerecError, StreamError
-from placerec.hohmm import read_beliefs
-from placerec.model import (
-    Decoding,
-    Options,
-    decode,
-    decode_lines,
-    format_beliefs,
-    load_model,
-    load_recognizer,
-    train_lm,
-)
+from placerec.errors import ModelError, OutputError, StreamError
+from placerec.hohmm import format_beliefs, read_beliefs
+from placerec.methods import decode, decode_lines
+from placerec.model import Options, load_recognizer, train_lm
 from placerec.words import Selection, parse_selection, read_stream
 
 
@@ -34,82 +24,11 @@ def world(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def refused(message: str, model: Path, error: type[PlacerecError] = ModelError) -> None:
-    with pytest.raises(error, match=re.escape(message)):
-        load_recognizer(model)
-
-
-def test_a_model_is_read_back(world: Path) -> None:
-    train_lm([world / "tokens"], world / "model", options=Options(3, select=Selection("compress", 2)))
-    model = load_model(world / "model")
-    assert list(model.models) == list(PLACES)
-    assert {one.order for one in model.models.values()} == {3}
-    assert model.selection == Selection("compress", 2)
-    assert load_recognizer(world / "model").places == PLACES
-
-
 def test_selection_is_applied_at_test_too(world: Path) -> None:
     train_lm([world / "tokens"], world / "model", options=Options(select=Selection("subsample", 3)))
     (beliefs,) = decode([world / "tokens/run3.tsv"], world / "model")
     assert beliefs.selected.tolist() == [i % 3 == 0 for i in range(60)]
     assert (beliefs.belief[1] == beliefs.belief[0]).all()
-
-
-def test_missing_or_broken_model_files_are_named(world: Path) -> None:
-    model = world / "model"
-    refused("nothing: no such model folder; `placerec train-lm TOKENS... -o ", world / "nothing")
-    refused("model.json: is a file, and the folder of a model is expected; name the folder", model / "model.json")
-    whole = (model / "hall.arpa").read_text()
-    (model / "hall.arpa").write_text(whole[: len(whole) // 2])
-    refused("hall.arpa:", model, LanguageModelError)
-    (model / "hall.arpa").write_text("")
-    refused("hall.arpa:1: the file ends where an ARPA file", model, LanguageModelError)
-    (model / "hall.arpa").unlink()
-    refused("hall.arpa: missing, though model.json lists the place 'hall'; train the model again", model)
-    (model / "model.json").unlink()
-    refused("model.json: missing, so ", model)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"format": "placerec model 9"}, "is not of the format 'placerec model 1'"),
-        ({"places": None}, "'places' must list the names of places, each once"),
-        ({"places": []}, "'places' must list the names of places, each once"),
-        ({"places": "hall"}, "'places' must list the names of places, each once"),
-        ({"places": ["hall", "hall"]}, "'places' must list the names of places, each once"),
-        ({"places": ["../hall"]}, "place '../hall' starts with a dot"),
-        ({"places": ["/hall"]}, "place '/hall' holds a /"),
-        ({"select": 7}, "selection '7' is unknown"),
-        ({"dictionary": 7}, "'dictionary' must be a fingerprint or null"),
-    ],
-)
-def test_a_model_json_that_cannot_be_used_is_named(world: Path, change: dict[str, Any], message: str) -> None:
-    path = world / "model/model.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
-    with pytest.raises(ModelError, match=rf"model\.json: {re.escape(message)}.*; train the model again$"):
-        load_model(world / "model")
-
-
-@pytest.mark.parametrize("text", ["{", "", "[]", "7", "null", "{}"])
-def test_a_model_json_that_is_none_is_named(world: Path, text: str) -> None:
-    (world / "model/model.json").write_text(text)
-    with pytest.raises(ModelError, match=r"model\.json: is n.*; train the model again$"):
-        load_model(world / "model")
-
-
-def test_models_of_two_vocabularies_are_refused(world: Path) -> None:
-    path = world / "model/hall.arpa"
-    path.write_text(path.read_text().replace("w05", "x05"))
-    refused("w05", world / "model")
-
-
-def test_unknown_scorers_and_probabilities_are_refused(world: Path) -> None:
-    with pytest.raises(ModelError, match="scorer 'magic' is unknown; choose native or kenlm"):
-        load_recognizer(world / "model", scorer="magic")
-    for stay in (-0.1, 1.1, math.nan):
-        with pytest.raises(ModelError, match="is not between 0 and 1"):
-            load_recognizer(world / "model", options=Decoding(stay=stay))
 
 
 def test_decoding_writes_what_it_returns(world: Path) -> None:
@@ -247,9 +166,3 @@ def test_json_files_are_json_lines(world: Path) -> None:
     assert sorted(path.name for path in (world / "beliefs").iterdir()) == ["run1.jsonl", "run2.jsonl", "run3.jsonl"]
     for line in (world / "beliefs/run1.jsonl").read_text().splitlines():
         assert json.loads(line, parse_constant=pytest.fail)["place"] in PLACES
-
-
-def test_all_words_are_known_to_the_recognizer(world: Path) -> None:
-    recognizer = load_recognizer(world / "model")
-    assert all(word in recognizer for word in VOCABULARY)
-    assert not any(word in recognizer for word in ("", "zz", "<s>", "</s>", "<unk>"))

@@ -3,6 +3,7 @@
 import io
 import json
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from helpers.small_world import PLACES, write_tokens
 
 from placerec.errors import ModelError, StreamError
 from placerec.hohmm import fixed_transition, learned_transition
-from placerec.model import Decoding, Options, decode, decode_lines, load_model, load_recognizer, train_lm, transition_of
+from placerec.methods import decode, decode_lines, load_decoder
+from placerec.model import Decoding, Options, load_model, load_recognizer, train_lm, transition_of
 from placerec.words import parse_selection, read_stream
 
 
@@ -163,3 +165,17 @@ def test_later_words_count_when_they_are_asked_to(world: Path) -> None:
 def test_options_that_exclude_each_other(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ModelError, match=re.escape(message)):
         Decoding(**options)
+
+
+@pytest.mark.parametrize("options", [Decoding(smooth=True), Decoding(viterbi=True), Decoding(lag=1)])
+def test_a_recognizer_does_not_ignore_what_needs_later_words(world: Path, options: Decoding) -> None:
+    for load in (load_recognizer, partial(load_decoder, "hohmm"), partial(load_decoder, "wu2009")):
+        with pytest.raises(ModelError, match=r"^(smooth|viterbi|lag) needs later words, and a recognizer "):
+            load(world / "model", options=options)
+
+
+def test_a_recognizer_that_is_asked_to_explains_its_last_word(world: Path) -> None:
+    recognizer = load_recognizer(world / "model", options=Decoding(explain=True))
+    recognizer.update("w01")
+    decision = recognizer.explain()
+    assert (decision["word"], list(decision["places"])) == ("w01", list(PLACES))

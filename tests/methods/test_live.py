@@ -5,6 +5,7 @@ import logging
 import math
 import re
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,9 +19,9 @@ from placerec.errors import ModelError, SourceError, StreamError
 from placerec.frames import Frame, find_sequences, read_gray
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.sequence import Gray
-from placerec.hohmm import Belief, Recognizer
-from placerec.methods import load_decoder
-from placerec.model import Decoding, LiveReport, decode, decode_live, follow_live, format_beliefs, train_lm
+from placerec.hohmm import Belief, Recognizer, format_beliefs
+from placerec.methods import LiveReport, decode, decode_live, follow_live, load_decoder
+from placerec.model import Decoding, train_lm
 from placerec.model.decoding import PAPER
 from placerec.vision import Dictionary
 from placerec.vision.sources import train_dictionary
@@ -112,7 +113,9 @@ def test_the_same_as_from_files(method: str, options: Decoding, world: Path) -> 
     stream = read_stream(world / "tokens/seq2.tsv")
     stream = with_columns(stream, times=np.arange(len(stream)) * 0.004)
     expected = load_decoder(method, world / "model", options=options).decode(stream)
+    started = time.monotonic()
     answers, report = followed(shots_of(world / "runs/seq2", 0.004), world, options, method)
+    assert 0 < report.seconds <= time.monotonic() - started
     assert [frame.name for frame, _ in answers] == list(expected.frames)
     assert [frame.place for frame, _ in answers] == list(expected.truth)
     assert [belief.word for _, belief in answers] == list(expected.words)
@@ -156,7 +159,7 @@ def test_whoever_is_slow_gets_the_newest_and_is_told(world: Path, caplog: pytest
     (report,) = reports
     assert (report.seen, report.answered, report.dropped) == (60, len(names), 60 - len(names))
     # Each frame counts for transitions per frame, those that were dropped, too.
-    assert decoder._frame == 60
+    assert decoder._now.frame == 60
     assert f"{60 - len(names)} of 60 frames dropped so far" in caplog.text
     summary = rf"frames seen 60, answered {len(names)} \([\d.]+ a second\), dropped {60 - len(names)}; ms from arrival"
     assert re.search(summary, caplog.text)

@@ -1,0 +1,283 @@
+"""Words (or images) in, belief over places out, frame by frame: what all methods that do so have in common."""
+
+import copy
+import logging
+import math
+import os
+from collections.abc import Callable, Collection, Container
+from dataclasses import dataclass, field
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.arrays import Floats
+from placerec.errors import ModelError, StreamError
+from placerec.frames.folder import SUFFIXES
+from placerec.hohmm.beliefs import UNKNOWN, Beliefs, list_places
+from placerec.words import Selection, WordStream, selector
+
+if TYPE_CHECKING:
+    from placerec.vision import Dictionary
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is believed after one frame: `probability` float64 (C,) beside `places`, summing to 1.
+
+    `unknown`: the probability that the place is none of them, None where nobody asked; the others hold if it is one.
+    """
+
+    places: tuple[str, ...] = field(repr=False)
+    probability: Floats = field(repr=False)
+    word: str
+    selected: bool
+    unknown: float | None = None
+
+    def __repr__(self) -> str:
+        unknown = "" if self.unknown is None else f", unknown {self.unknown:.3g}"
+        return f"Belief({self.best!r}, {self.probability.max():.3g}{unknown}, word={self.word!r})"
+
+    @property
+    def best(self) -> str:
+        """The most probable place, the first in order where several are; "unknown" if that is above 1/2."""
+        if self.unknown is not None and self.unknown > 0.5:
+            return UNKNOWN
+        return self.places[int(np.argmax(self.probability))]
+
+    def as_dict(self) -> dict[str, float]:
+        """Place -> probability."""
+        return dict(zip(self.places, self.probability.tolist(), strict=True))
+
+
+class Posterior(NamedTuple):
+    """The belief after a selected word, float64 (C,), and `unknown`: that the place is none of them, None if not asked.
+
+    `possible`: whether any place gives the word a probability above 0.
+    """
+
+    probability: Floats
+    unknown: float | None = None
+    possible: bool = True
+
+
+# Takes in a selected word: the word, the steps since the selected word before (None for the first), and the distance
+# from the frame's descriptor to the word (None where it is unknown).
+TakeIn = Callable[[str, float | None, float | None], Posterior]
+
+
+@dataclass
+class _Sequence:
+    """The sequence so far: the posterior, what takes in the next word and what selects it; frames, and the last time.
+
+    `updated`: frame and time of the last selected word, None before the first.
+    """
+
+    posterior: Posterior
+    take_in: TakeIn
+    keep: Callable[[str], bool]
+    frame: int = 0
+    time: float | None = None
+    updated: tuple[int, float | None] | None = None
+
+
+class SequenceDecoder:
+    """Beliefs over places on-line, in constant memory, from words that are selected as in training.
+
+    A word that the selection skips leaves the belief as it is (readings A16). More than `max_gap` seconds between two
+    frames begin a new sequence. `dictionary` turns images into words. Attributes without an underscore cannot be
+    assigned: decoding a whole sequence and word by word would part ways; `changed` makes a copy with other settings.
+    A subclass says in `_begin` what is believed before any word, and how a word changes that.
+    """
+
+    _SETTINGS: tuple[str, ...] = ("selection", "dictionary", "max_gap")
+    # What a frame's missing time is needed for, in an error.
+    _NEEDING = "the largest gap needs"
+
+    def __init__(
+        self,
+        places: Collection[str],
+        words: Collection[str],
+        *,
+        selection: Selection = Selection(),
+        dictionary: "Dictionary | None" = None,
+        max_gap: float | None = None,
+    ) -> None:
+        self.places: Final = tuple(places)
+        self.selection: Final = selection
+        self.dictionary: Final = dictionary
+        self.max_gap: Final = max_gap
+        self._words = words
+        self._restart()
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in self.__dict__ and not name.startswith("_"):
+            remedy = f"; changed({name}=...) gives another one" if name in self._SETTINGS else ""
+            raise AttributeError(f"{name} of a {type(self).__name__} is fixed{remedy}")
+        super().__setattr__(name, value)
+
+    def __repr__(self) -> str:
+        sizes = f"{list_places(self.places)}; {len(self._words)} words"
+        return f"{type(self).__name__}({sizes}; {self._settings()})"
+
+    def _settings(self) -> str:
+        """Settings, for `repr`."""
+        gap = "" if self.max_gap is None else f", gaps above {self.max_gap:g} s"
+        return f"selection {self.selection}{gap}"
+
+    def __contains__(self, word: object) -> bool:
+        return word in self._words
+
+    def changed(self, **settings: Any) -> Self:
+        """A copy with other settings, named as the arguments of the class, at the beginning of a sequence.
+
+        Raises TypeError for a name that is no setting, and whatever the class raises for the value.
+        """
+        for name in settings:
+            if name not in self._SETTINGS:
+                raise TypeError(f"{name!r} is no setting of a {type(self).__name__}: {', '.join(self._SETTINGS)}")
+        copied = copy.copy(self)
+        vars(copied).update(settings)
+        copied._restart()
+        return copied
+
+    def _restart(self) -> None:
+        self._zero_likelihood_words = 0
+        self.reset()
+
+    def _begin(self) -> tuple[Posterior, TakeIn]:
+        """The belief before any word of a sequence, and what takes in its selected words."""
+        raise NotImplementedError
+
+    @property
+    def zero_likelihood_words(self) -> int:
+        """How many selected words had probability 0 in every place, since the decoder was made."""
+        return self._zero_likelihood_words
+
+    @property
+    def asks_unknown(self) -> bool:
+        """Whether beliefs tell the probability that the place is none of `places`."""
+        return self._now.posterior.unknown is not None
+
+    @property
+    def _per(self) -> str:
+        """What a step between two selected words is: `update`, `frame` or `second`."""
+        return "frame"
+
+    @property
+    def _needs_times(self) -> bool:
+        return self.max_gap is not None or self._per == "second"
+
+    def reset(self) -> None:
+        """Forget the sequence so far: the belief is that before any word, and no word has been seen."""
+        self._now = _Sequence(*self._begin(), selector(self.selection))
+
+    def update(
+        self, word_or_image: "str | NDArray[Any]", time: float | None = None, distance: float | None = None
+    ) -> Belief:
+        """The belief after one more frame: its word, or its image (h, w) grey 0..255 if there is a dictionary.
+
+        `time` in seconds: needed with a largest gap and with transitions per second. `distance` of a word, from the
+        descriptor to its unit: evidence for a place that is unknown; that of an image comes from the dictionary. Raises
+        ModelError for a word that is not in the vocabulary, for an image without a dictionary, and for a time that is
+        needed and missing, or goes back; nothing has changed then.
+        """
+        if isinstance(word_or_image, str):
+            word = word_or_image
+        else:
+            word, distance = self._look(word_or_image)
+        if word not in self._words:
+            raise ModelError(f"the word {word!r} is not in the models' vocabulary{_image_hint(word)}")
+        self._pass(time, needed=self._needs_times)
+        now = self._now
+        selected = now.keep(word)
+        if selected:
+            now.posterior = now.take_in(word, self._steps(now), distance)
+            now.updated = now.frame, now.time
+            if not now.posterior.possible:
+                self._zero_likelihood_words += 1
+        return self.belief(word, selected)
+
+    def skip(self, time: float | None = None) -> Belief:
+        """The belief after one more frame that has no word: it is held, but the frame and its time count."""
+        self._pass(time, needed=False)
+        return self.belief()
+
+    def belief(self, word: str = "", selected: bool = False) -> Belief:
+        """The belief as it stands."""
+        probability, unknown, _ = self._now.posterior
+        return Belief(self.places, probability.copy(), word, selected, unknown)
+
+    def decode(self, stream: WordStream) -> Beliefs:
+        """The beliefs over a whole sequence: those that `update` gives from a reset, which later words never change.
+
+        Words that are not in the vocabulary are skipped as `skip` does, and counted in a warning. Raises StreamError,
+        naming the frame, if its time is needed and missing, or goes back.
+        """
+        self.reset()
+        warn_of_unlisted(stream, self)
+        rows = []
+        frames = zip(stream.words, stream.times.tolist(), stream.distances.tolist(), strict=True)
+        for name, (word, time, distance) in zip(stream.frames, frames, strict=True):
+            try:
+                rows.append(self.update(word, time, distance) if word in self else self.skip(time))
+            except ModelError as error:
+                raise StreamError(f"{stream.name}: frame {name!r}: {error}") from error
+        return Beliefs.of(
+            stream,
+            self.places,
+            np.array([row.probability for row in rows]).reshape(len(rows), len(self.places)),
+            selected=np.array([row.selected for row in rows], bool),
+            unknown=np.array([row.unknown for row in rows], float) if self.asks_unknown else None,
+        )
+
+    def _pass(self, time: float | None, *, needed: bool) -> None:
+        """Take note of one more frame; after a gap everything starts anew."""
+        known = time is not None and not math.isnan(time)
+        if needed and not known:
+            raise ModelError(f"the frame has no time, which {self._NEEDING}")
+        if time is not None and known:
+            before = self._now.time
+            if self._needs_times and before is not None and time < before:
+                raise ModelError(f"time goes back from {before:.6f} to {time:.6f} s")
+            if self.max_gap is not None and before is not None and time - before > self.max_gap:
+                log.info("%g s without a frame: a new sequence begins", time - before)
+                self.reset()
+            self._now.time = time
+        self._now.frame += 1
+
+    def _steps(self, now: _Sequence) -> float | None:
+        """Steps since the last selected word, None before the first."""
+        if now.updated is None:
+            return None
+        frame, time = now.updated
+        if self._per == "frame":
+            return now.frame - frame
+        if self._per == "second" and now.time is not None and time is not None:
+            return now.time - time
+        return 1.0
+
+    def _look(self, image: NDArray[Any]) -> tuple[str, float]:
+        if isinstance(image, os.PathLike):
+            raise ModelError(f"{str(image)!r} is a path, and a word or an image is expected{_image_hint(str(image))}")
+        if self.dictionary is None:
+            raise ModelError("an image needs a dictionary to become a word; give the recognizer the words.npz")
+        return self.dictionary.look(image)
+
+
+def warn_of_unlisted(stream: WordStream, listed: Container[str]) -> None:
+    """Say how many words of a stream are not `listed`, if any."""
+    unlisted = [word for word in stream.words if word not in listed]
+    if unlisted:
+        message = "%s: words that the models do not list: %d skipped, %r first"
+        log.warning(message, stream.name, len(unlisted), unlisted[0])
+
+
+def _image_hint(text: str) -> str:
+    """How to give an image, where a text looks like the name of an image's file."""
+    if PurePath(text).suffix.lower() not in SUFFIXES and not {"/", "\\"} & {*text}:
+        return ""
+    return f"; for an image, give its grey levels: read_gray({text!r})"
