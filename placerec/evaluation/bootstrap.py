@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import EvaluationError
 from placerec.evaluation.metrics import right_frames
 from placerec.hohmm.beliefs import Beliefs
@@ -21,14 +22,13 @@ LEVEL = 0.95
 # Of two equal methods one is better on each of five blocks in one case of 16, on each of six in one of 32: with fewer
 # than six no difference holds at the level, however clear the interval looks.
 LEAST = 6
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Blocks:
     """What is drawn: U sequences, or the visits of a single one. `frames` int64 (U,): labelled ones, all above 0."""
 
-    frames: NDArray[np.int64]
+    frames: Ints
     what: str  # "sequences" or "visits"
 
 
@@ -67,18 +67,18 @@ def count_blocks(beliefs: Sequence[Beliefs]) -> tuple[Blocks, Floats]:
     return Blocks(frames, what), np.array([right.sum() for _, right in counted], np.float64)
 
 
-def _labelled(sequence: Beliefs) -> tuple[NDArray[np.str_], NDArray[np.bool_]]:
+def _labelled(sequence: Beliefs) -> tuple[NDArray[np.str_], Mask]:
     truth = np.array(sequence.truth, np.str_)
     return truth[truth != ""], right_frames(sequence)[truth != ""]
 
 
-def draw(blocks: int, seed: int, draws: int = DRAWS) -> NDArray[np.int64]:
+def draw(blocks: int, seed: int, draws: int = DRAWS) -> Ints:
     """How often each block is in each draw: int64 (draws, blocks), rows sum to `blocks`."""
     rng = np.random.Generator(np.random.PCG64(seed))
     return rng.multinomial(blocks, np.full(blocks, 1 / blocks), size=draws)
 
 
-def interval(drawn: NDArray[np.int64], value: Floats, frames: NDArray[np.int64]) -> tuple[float, float]:
+def interval(drawn: Ints, value: Floats, frames: Ints) -> tuple[float, float]:
     """The percentile interval of sum(value) / sum(frames) over the draws; `value` float64 (U,), `frames` int64 (U,)."""
     # Not BLAS, whose sums depend on the number of its threads.
     shares = np.einsum("du,u->d", drawn, value) / np.einsum("du,u->d", drawn, frames)
@@ -91,7 +91,7 @@ def middle(drawn: Floats, whole: float) -> tuple[float, float]:
     return min(low, whole), max(high, whole)
 
 
-def compare_pairs(right: dict[str, Floats], frames: NDArray[np.int64], drawn: NDArray[np.int64]) -> list[Pair]:
+def compare_pairs(right: dict[str, Floats], frames: Ints, drawn: Ints) -> list[Pair]:
     """Every two methods of `right` (name -> right frames per block), in their order."""
     pairs = []
     for first, second in combinations(right, 2):

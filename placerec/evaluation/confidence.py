@@ -3,10 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from placerec.arrays import Floats, Ints, Mask
 
 ECE_BINS = 15
 COVERAGES = tuple(step / 20 for step in range(1, 21))
@@ -19,7 +17,7 @@ class Reliability:
     frames: int64 (15,); belief and accuracy: float64 (15,), the means of a bin, nan where it has no frame.
     """
 
-    frames: NDArray[np.int64]
+    frames: Ints
     belief: Floats
     accuracy: Floats
 

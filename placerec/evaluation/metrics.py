@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import EvaluationError
 from placerec.evaluation.confidence import NewPlaces, Reliability, RiskCoverage, new_places, reliability, risk_coverage
+from placerec.frames.table import Labels
 from placerec.hohmm.beliefs import UNKNOWN, Beliefs
 
 # A belief of 0 in the true place would make the mean infinite, and one frame would then hide all others.
@@ -46,7 +47,7 @@ class Evaluation:
     majority_accuracy: float
     majority_place: str
     per_place: dict[str, PlaceScore]
-    confusion: NDArray[np.int64]  # (P, P) frames: true place x decided place
+    confusion: Ints  # (P, P) frames: true place x decided place
     changes: int
     change_latency_frames: float | None  # median; None without a change
     reliability: Reliability
@@ -101,17 +102,17 @@ def evaluate(beliefs: Sequence[Beliefs]) -> Evaluation:
     _refuse_twins(beliefs)
     _refuse_unlabelled(beliefs)
     places = place_order(beliefs)
-    truths = [codes(sequence.truth, places) for sequence in beliefs]
-    decisions = [codes(sequence.best, places) for sequence in beliefs]
-    rights = [right_frames(sequence) for sequence in beliefs]
-    truth, decided, right = np.concatenate(truths), np.concatenate(decisions), np.concatenate(rights)
-    labelled = truth != _UNLABELLED
-    right = right[labelled]
-    confidence = np.concatenate([_belief_in(sequence, sequence.best) for sequence in beliefs])[labelled]
-    evidence = np.concatenate([_belief_in(sequence, sequence.truth) for sequence in beliefs])[labelled]
-    confusion = _confusion(truth[labelled], decided[labelled], len(places))
+    truths = [one.stream.table.places.codes(places) for one in beliefs]
+    rights = [right_frames(one) for one in beliefs]
+    labelled = np.concatenate(truths) != _UNLABELLED
+    truth, right = np.concatenate(truths)[labelled], np.concatenate(rights)[labelled]
+    decided = np.concatenate([Labels(one.best).codes(places) for one in beliefs])[labelled]
+    confidence = np.concatenate([_belief_in(one, Labels(one.best)) for one in beliefs])[labelled]
+    evidence = np.concatenate([_belief_in(one, one.stream.table.places) for one in beliefs])[labelled]
+    size = len(places)
+    confusion = np.bincount(truth * size + decided, minlength=size * size).reshape(size, size).astype(np.int64)
     support = confusion.sum(axis=1)
-    per_place = _per_place(places, truth[labelled], decided[labelled], right)
+    per_place = _per_place(places, truth, decided, right)
     latencies = np.concatenate([change_latencies(t, r) for t, r in zip(truths, rights, strict=True)])
     recalls = [score.recall for score in per_place.values() if score.recall is not None]
     return Evaluation(
@@ -142,20 +143,14 @@ def place_order(beliefs: Sequence[Beliefs]) -> tuple[str, ...]:
     return (*columns, *sorted(others), *([UNKNOWN] if asked else []))
 
 
-def right_frames(sequence: Beliefs) -> NDArray[np.bool_]:
-    """bool (n,): what was decided is the label, or `unknown` for a label that has no column."""
-    answers = [UNKNOWN if new else label for label, new in zip(sequence.truth, _new_frames(sequence), strict=True)]
-    pairs = zip(sequence.truth, answers, sequence.best, strict=True)
-    return np.array([bool(label) and best in (label, answer) for label, answer, best in pairs], dtype=np.bool_)
+def right_frames(sequence: Beliefs) -> Mask:
+    """The frames whose decided place is their label, or `unknown` where the label has no column, bool (n,)."""
+    truth, best = np.array(sequence.truth, np.str_), np.array(sequence.best, np.str_)
+    right: Mask = (truth != "") & ((best == truth) | (_new_frames(sequence) & (best == UNKNOWN)))
+    return right
 
 
-def codes(names: Sequence[str], places: Sequence[str]) -> NDArray[np.int64]:
-    """Each name's index in `places`, -1 for the empty name: (n,) int64."""
-    index = {place: number for number, place in enumerate(places)} | {"": _UNLABELLED}
-    return np.array([index[name] for name in names], dtype=np.int64)
-
-
-def change_latencies(truth: NDArray[np.int64], right: NDArray[np.bool_]) -> NDArray[np.int64]:
+def change_latencies(truth: Ints, right: Mask) -> Ints:
     """Frames from each change of the true place to the first right frame, the visit's length if there is none.
 
     truth: (n,) place indices of one sequence, -1 where unlabelled; right: (n,). A visit is a run of frames with one
@@ -172,7 +167,7 @@ def change_latencies(truth: NDArray[np.int64], right: NDArray[np.bool_]) -> NDAr
     # The first right frame at or after each start; the visit's end stands in where it lies beyond the visit.
     found = np.append(np.flatnonzero(right), len(truth))
     first = found[np.searchsorted(found, starts)]
-    latencies: NDArray[np.int64] = np.minimum(first, ends) - starts
+    latencies: Ints = np.minimum(first, ends) - starts
     return latencies
 
 
@@ -195,59 +190,44 @@ def _refuse_unlabelled(beliefs: Sequence[Beliefs]) -> None:
     )
 
 
-def _new_frames(sequence: Beliefs) -> list[bool]:
-    """Per frame, whether it has a label that no column has, where the sequence has the column `unknown`."""
-    known = {"", *sequence.places} if sequence.unknown is not None else {*sequence.truth}
-    return [label not in known for label in sequence.truth]
+def _new_frames(sequence: Beliefs) -> Mask:
+    """The frames with a label that no column has, where the sequence has the column `unknown`, bool (n,)."""
+    if sequence.unknown is None:
+        return np.zeros(len(sequence), bool)
+    return sequence.stream.table.labelled & (sequence.stream.table.places.codes(sequence.places) < 0)
 
 
 def _new_places(beliefs: Sequence[Beliefs]) -> NewPlaces | None:
     asked = [(sequence, sequence.unknown) for sequence in beliefs if sequence.unknown is not None]
     if not asked:
         return None
-    labelled = np.concatenate([np.array(sequence.truth, np.str_) != "" for sequence, _ in asked])
-    new = np.concatenate([np.array(_new_frames(sequence), np.bool_) for sequence, _ in asked])
+    labelled = np.concatenate([sequence.stream.table.labelled for sequence, _ in asked])
+    new = np.concatenate([_new_frames(sequence) for sequence, _ in asked])
     return new_places(np.concatenate([unknown for _, unknown in asked])[labelled], new[labelled])
 
 
-def _belief_in(sequence: Beliefs, names: Sequence[str]) -> NDArray[np.float64]:
-    """The belief of each frame in the place named for it: (n,).
+def _belief_in(sequence: Beliefs, names: Labels) -> Floats:
+    """The belief of each frame in the place that is named for it, float64 (n,).
 
-    For a place that has no column, that in `unknown`, or 0 where the sequence has none.
+    Of a place that has no column, the belief in `unknown`, 0 where the sequence has none.
     """
-    column = {place: number for number, place in enumerate(sequence.places)}
-    columns = np.array([column.get(name, len(column)) for name in names], dtype=np.int64)
     unknown = np.zeros(len(names)) if sequence.unknown is None else sequence.unknown
     together = np.hstack([sequence.belief * (1 - unknown[:, None]), unknown[:, None]])
-    picked: NDArray[np.float64] = together[np.arange(len(names)), columns]
+    # -1, the code of a place without a column, is the last column.
+    picked: Floats = together[np.arange(len(names)), names.codes(sequence.places)]
     return picked
 
 
-def _confusion(truth: NDArray[np.int64], decided: NDArray[np.int64], size: int) -> NDArray[np.int64]:
-    return np.bincount(truth * size + decided, minlength=size * size).reshape(size, size).astype(np.int64)
-
-
-def _per_place(
-    places: Sequence[str], truth: NDArray[np.int64], decided: NDArray[np.int64], right: NDArray[np.bool_]
-) -> dict[str, PlaceScore]:
-    def share(part: int, whole: int) -> float | None:
-        return part / whole if whole else None
-
-    def count(place: NDArray[np.int64]) -> list[int]:
-        counts: list[int] = np.bincount(place, minlength=len(places)).tolist()
-        return counts
-
-    support, chosen = count(truth), count(decided)
-    recalled, precise = count(truth[right]), count(decided[right])
+def _per_place(places: Sequence[str], truth: Ints, decided: Ints, right: Mask) -> dict[str, PlaceScore]:
+    named = truth, decided, truth[right], decided[right]
+    counts = [np.bincount(one, minlength=len(places)).tolist() for one in named]
     return {
-        place: PlaceScore(
-            precision=share(precise[i], chosen[i]), recall=share(recalled[i], support[i]), frames=support[i]
-        )
-        for i, place in enumerate(places)
+        place: PlaceScore(precise / chosen if chosen else None, recalled / frames if frames else None, frames)
+        for place, frames, chosen, recalled, precise in zip(places, *counts, strict=True)
     }
 
 
-def _sequence_score(truth: NDArray[np.int64], right: NDArray[np.bool_]) -> SequenceScore:
+def _sequence_score(truth: Ints, right: Mask) -> SequenceScore:
     labelled = truth != _UNLABELLED
     frames = int(labelled.sum())
     accuracy = float(right[labelled].mean()) if frames else None

@@ -7,9 +7,10 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints
 from placerec.evaluation.confidence import COVERAGES, ECE_BINS, NewPlaces, Reliability, RiskCoverage
-from placerec.evaluation.metrics import Evaluation, codes, place_order, right_frames
+from placerec.evaluation.metrics import Evaluation, place_order, right_frames
 from placerec.evaluation.summary import percent, shorten
 from placerec.figures.canvas import BLACK, WHITE, letter_colour, place_colours
+from placerec.frames.table import Labels
 from placerec.hohmm.beliefs import UNKNOWN, Beliefs
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None
     if not frames:
         axes.text(0.5, 0.5, "no frames", ha="center", va="center", fontsize=8, color="0.4")
         return
-    truth, decided = codes(beliefs.truth, places), codes(beliefs.best, places)
+    truth, decided = beliefs.stream.table.places.codes(places), Labels(beliefs.best).codes(places)
     drawn = np.unique(np.linspace(0, frames - 1, min(frames, _MOST_COLUMNS)).round().astype(np.int64))
     if len(drawn) < frames:
         axes.set_title(f"{len(drawn)} of {frames} frames are drawn", loc="right", fontsize=6.5, color="0.4", pad=3)
@@ -113,9 +114,9 @@ def _shares(beliefs: Beliefs, drawn: Ints, places: Sequence[str]) -> tuple[Float
     """The probabilities of the frames `drawn` (n, columns), and the place of each column."""
     belief = beliefs.belief[drawn]
     if beliefs.unknown is None:
-        return belief, codes(beliefs.places, places)
+        return belief, Labels(beliefs.places).codes(places)
     unknown = beliefs.unknown[drawn, None]
-    return np.hstack([belief * (1 - unknown), unknown]), codes((*beliefs.places, UNKNOWN), places)
+    return np.hstack([belief * (1 - unknown), unknown]), Labels((*beliefs.places, UNKNOWN)).codes(places)
 
 
 def _stacked(belief: Floats, place: Ints) -> Ints:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Singles
 from placerec.evaluation.summary import percent, shorten
 from placerec.figures.canvas import MARGIN, figure_file, panel, picture_file, write_line
 from placerec.frames import Reading, Sequence, read_gray
@@ -47,11 +48,11 @@ class FrameView:
     name: str
     spec: DescriptorSpec
     picture: Gray
-    values: NDArray[np.float32]
+    values: Singles
     words: tuple[str, ...]
-    hits: NDArray[np.int64]
+    hits: Ints
     unit: int
-    distances: NDArray[np.float64]
+    distances: Floats
     nearest: tuple[int, ...]
     table: WordTable | None
 
@@ -180,7 +181,7 @@ def draw_frame_sheet(view: FrameView, typical: Mapping[int, Gray], path: Path | 
             _unit(axes, view, unit, typical.get(unit))
 
 
-def energies(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def energies(values: Singles) -> Singles:
     """GIST (384,) as (scale, turn, row, column): how strong edges are in each window of the picture.
 
     Scales from the finest; turn t: edges at 90 + 30 t degrees, counted as on paper, counter-clockwise from the right.
@@ -201,7 +202,7 @@ def _fitted(axes: "Axes", picture: NDArray[Any], title: str, *, windows: bool, p
     axes.set_title(title, loc="left", fontsize=8.5)
 
 
-def _roses(axes: "Axes", picture: NDArray[Any], energy: NDArray[np.float32], name: str) -> None:
+def _roses(axes: "Axes", picture: NDArray[Any], energy: Singles, name: str) -> None:
     """A rose in every window from energies (turn, row, column): petals point along the edges."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
@@ -223,7 +224,7 @@ def _roses(axes: "Axes", picture: NDArray[Any], energy: NDArray[np.float32], nam
     axes.set_xlabel(text, fontsize=7.5, loc="left", color="0.25")
 
 
-def _values(axes: "Axes", values: NDArray[np.float32]) -> None:
+def _values(axes: "Axes", values: Singles) -> None:
     """A descriptor whose values have no place in the picture, as bars."""
     axes.stairs(values, fill=True, color=_ROSE)
     axes.set_xlim(0, len(values))

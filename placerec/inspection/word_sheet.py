@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.evaluation.summary import shorten
 from placerec.figures.canvas import (
     MARGIN,
@@ -152,7 +153,7 @@ def _lattice(axes: "Axes", table: WordTable, pictures: Sequence[Any], tiles: _Ti
     _marks(axes, table, tiles, colours)
 
 
-def _bar(votes: NDArray[np.int64], colours: NDArray[np.float64]) -> list[tuple[float, float, tuple[float, ...]]]:
+def _bar(votes: Ints, colours: Floats) -> list[tuple[float, float, tuple[float, ...]]]:
     """The stretches of a tile's bar: where each starts, how long it is (shares of the bar), and its colour."""
     if not votes.any():
         return []
@@ -175,7 +176,7 @@ def _tile(picture: NDArray[Any], aspect: float) -> NDArray[np.uint8]:
     return tile
 
 
-def _marks(axes: "Axes", table: WordTable, tiles: _Tiles, colours: NDArray[np.float64]) -> None:
+def _marks(axes: "Axes", table: WordTable, tiles: _Tiles, colours: Floats) -> None:
     """Numbers on the tiles and at the edges, and crosses; where there is no room for letters, crosses alone."""
     font = min(8.0, 8.5 * tiles.width)
     written = tiles.width >= 0.45

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import SourceError
 from placerec.evaluation.summary import percent, shorten
 from placerec.frames import Reading, Sequence, find_sequences, images_at
@@ -36,29 +36,29 @@ class WordTable:
     words: tuple[str, ...]
     size: int
     units: str
-    hits: NDArray[np.int64]
-    frames: NDArray[np.int64]
+    hits: Ints
+    frames: Ints
     places: tuple[str, ...]
-    votes: NDArray[np.int64]
-    typical: NDArray[np.int64]
-    distances: NDArray[np.float32]
-    u_matrix: NDArray[np.float64]
+    votes: Ints
+    typical: Ints
+    distances: Singles
+    u_matrix: Floats
     to_dead: int
     is_training: bool  # the frames look like those that trained the map: as many of them hit each unit
     looked_at: FrameTable  # the n frames
 
     @property
-    def place(self) -> NDArray[np.int64]:
+    def place(self) -> Ints:
         """The place that most frames of a word have, (K,): index in places, -1 where no frame has a label."""
         if not self.places:
             return np.full(len(self.words), -1)
         return np.where(self.votes.any(axis=1), self.votes.argmax(axis=1), -1)
 
     @property
-    def share(self) -> NDArray[np.float64]:
+    def share(self) -> Floats:
         """The share of that place among the word's labelled frames, (K,), nan where no frame has a label."""
         most, labelled = self.votes.max(axis=1, initial=0), self.votes.sum(axis=1)
-        share: NDArray[np.float64] = np.where(labelled > 0, most / np.maximum(labelled, 1), np.nan)
+        share: Floats = np.where(labelled > 0, most / np.maximum(labelled, 1), np.nan)
         return share
 
     def to_json(self) -> dict[str, object]:
@@ -173,7 +173,7 @@ def _preview(image: Gray) -> Gray:
     return image if scale >= 1 else cast(Gray, cv2.resize(image, size, interpolation=cv2.INTER_AREA))
 
 
-def u_matrix(codebook: NDArray[np.float32]) -> NDArray[np.float64]:
+def u_matrix(codebook: Singles) -> Floats:
     """The mean distance of every unit to the units above, below, left and right of it, (size, size)."""
     size = round(len(codebook) ** 0.5)
     lattice = codebook.astype(np.float64).reshape(size, size, -1)

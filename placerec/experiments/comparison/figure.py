@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats
 from placerec.evaluation.summary import percent, shorten
 from placerec.experiments.comparison.benchmark import COMPARED, DESCRIPTORS, TWO_WORDS, WORDS
 from placerec.experiments.comparison.results import Comparison, MethodScore
@@ -115,7 +115,7 @@ def _labels(axes: "Axes", scores: list[MethodScore], inches: float) -> None:
         )
 
 
-def spread(wanted: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
+def spread(wanted: Floats, apart: float) -> Floats:
     """Ascending positions (n,) moved as little as it takes to be `apart`, within 0..1 where there is room.
 
     Groups that touch share their middle: the least squares of the moves, by pooling neighbours.
@@ -130,7 +130,7 @@ def spread(wanted: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
         groups.append((mean, size))
     placed = np.repeat([mean for mean, _ in groups], [size for _, size in groups]) if groups else np.empty(0)
     highest = max(0.0, 1.0 - (steps[-1] if len(steps) else 0.0))
-    moved: NDArray[np.float64] = np.clip(placed, 0.0, highest) + steps
+    moved: Floats = np.clip(placed, 0.0, highest) + steps
     return moved
 
 

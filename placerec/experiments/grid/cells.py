@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Singles
 from placerec.evaluation import evaluate
-from placerec.evaluation.metrics import change_latencies, codes, right_frames
+from placerec.evaluation.metrics import change_latencies, right_frames
 from placerec.experiments.store import load, save
 from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition
 from placerec.hohmm.decoder import warn_of_unlisted
@@ -135,7 +135,7 @@ def _printed(model: BackoffModel) -> BackoffModel:
     return BackoffModel(model.trie, log10_ps, backoffs)
 
 
-def seven_digits(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def seven_digits(values: Singles) -> Singles:
     """The numbers as they come back from an ARPA file, where they have seven significant digits."""
     exact = values.astype(np.float64)
     rounded = np.isfinite(exact) & (exact != 0)
@@ -191,7 +191,7 @@ def judged(beliefs: Sequence[Beliefs]) -> dict[str, Any]:
 
 def _counts_of(one: Beliefs) -> list[int]:
     """The labelled frames of a sequence, how many of them were decided rightly, and how many late."""
-    truth, right = codes(one.truth, sorted({*one.truth} - {""})), right_frames(one)
+    truth, right = one.stream.table.places.codes(sorted({*one.truth} - {""})), right_frames(one)
     return [int((truth >= 0).sum()), int(right.sum()), int(change_latencies(truth, right).sum())]
 
 

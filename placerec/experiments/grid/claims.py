@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placerec.evaluation.bootstrap import LEAST, Floats, middle
+from placerec.arrays import Floats
+from placerec.evaluation.bootstrap import LEAST, middle
 from placerec.experiments.grid.results import MissingCellsError, Results, Scores, mean, scores
 
 HOLDS, FAILS, UNKNOWN = "holds", "does not hold", "cannot tell"
