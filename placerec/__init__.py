@@ -10,8 +10,8 @@ from placerec.version import __version__
 
 _ROOMS = {
     "placerec.errors": ("PlacerecError",),
-    "placerec.frames": ("Frame", "Reading", "Sequence", "find_sequences", "read_gray"),
-    "placerec.vision": ("DescriptorSpec", "Dictionary", "describe", "gist", "train_dictionary"),
+    "placerec.frames": ("Frame", "SourceOptions", "Sequence", "find_sequences", "read_gray"),
+    "placerec.vision": ("DescriptorSpec", "Dictionary", "DictionaryOptions", "describe", "gist", "train_dictionary"),
     "placerec.words": ("Selection", "WordStream", "parse_selection", "read_stream", "select", "write_stream"),
     "placerec.words.tokenize": ("tokenize",),
     "placerec.lm": ("BackoffModel", "count_ngrams", "estimate", "read_arpa", "smoothing", "write_arpa"),
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from placerec.experiments.comparison import compare
     from placerec.experiments.grid import experiment
     from placerec.figures import evaluate_files
-    from placerec.frames import Frame, Reading, Sequence, find_sequences, read_gray
+    from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, read_gray
     from placerec.hohmm import (
         Belief,
         Beliefs,
@@ -75,13 +75,14 @@ __all__ = [
     "Decoding",
     "DescriptorSpec",
     "Dictionary",
+    "DictionaryOptions",
     "Frame",
     "Options",
     "PlacerecError",
-    "Reading",
     "Recognizer",
     "Selection",
     "Sequence",
+    "SourceOptions",
     "Transition",
     "WordStream",
     "__version__",

@@ -22,7 +22,7 @@ from placerec.jobs import ProgressBar
 from placerec.lab import render_lab
 from placerec.lm.inspection import format_inspection, inspect_model
 from placerec.model import Options, load_recognizer, read_corpus, train_model
-from placerec.vision import Dictionary, describe
+from placerec.vision import Dictionary, DictionaryOptions, describe
 from placerec.words import read_stream
 from placerec.words.tokenize import tokens_of, write_tokens
 
@@ -59,7 +59,9 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
         with progress("describe") as show:
             descriptors = describe(sequences, progress=show)
         training = np.array([not name.endswith(TEST_RUN) for name in descriptors.sequences])
-        dictionary = Dictionary.fit(descriptors.values[training], spec=descriptors.spec, seed=seed)
+        dictionary = Dictionary.fit(
+            descriptors.values[training], spec=descriptors.spec, options=DictionaryOptions(seed=seed)
+        )
         dictionary.save(folder / "words.npz")
         write_tokens(tokens_of(descriptors, dictionary), dictionary, folder / "tokens")
         log.info("Training language models and recognising run 3")

@@ -24,7 +24,7 @@ from placerec.cluster import check_address, cluster
 from placerec.errors import MissingExtraError, StreamError
 from placerec.jobs import JobError, Numbered, RemoteExecutor, ScatteredMap, scatter
 from placerec.model import Options, train_lm
-from placerec.vision import DescriptorSpec, Dictionary, describe_sources, train_dictionary
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe_sources, train_dictionary
 from placerec.words.tokenize import tokenize
 
 pytest.importorskip("distributed", reason="needs the extra: pip install 'placerec[cluster]'")
@@ -170,16 +170,18 @@ def test_describe(machines: LocalDask, images: Path, tmp_path: Path) -> None:
 
 
 def test_train_words(machines: LocalDask, images: Path, tmp_path: Path) -> None:
-    train_dictionary([images], tmp_path / "here.npz", spec=SPEC, size=5, epochs=4)
+    train_dictionary([images], tmp_path / "here.npz", spec=SPEC, options=DictionaryOptions(size=5, epochs=4))
     for after in (14, 40):  # nine batches are described, nine chunks go to the PCA, then nine to every epoch
         with dying(machines, after) as work:
-            train_dictionary([images], tmp_path / "there.npz", spec=SPEC, size=5, epochs=4, work=work)
+            train_dictionary(
+                [images], tmp_path / "there.npz", spec=SPEC, options=DictionaryOptions(size=5, epochs=4), work=work
+            )
         assert contents(tmp_path / "here.npz") == contents(tmp_path / "there.npz")
 
 
 def test_tokenize(machines: LocalDask, images: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = np.random.default_rng(0).normal(size=(60, SPEC.length)).astype(np.float32)
-    Dictionary.fit(rows, spec=SPEC, size=4).save(tmp_path / "words.npz")
+    Dictionary.fit(rows, spec=SPEC, options=DictionaryOptions(size=4)).save(tmp_path / "words.npz")
     tokenize([images], tmp_path / "words.npz", tmp_path / "here")
     with dying(machines, after=4) as work:
         tokenize([images], tmp_path / "words.npz", tmp_path / "there", work=work)

@@ -14,7 +14,7 @@ from placerec.frames import find_sequences
 from placerec.jobs import workers
 from placerec.lm import stored_text, windows
 from placerec.model import train_lm
-from placerec.vision import DescriptorSpec, Dictionary, chunks, describe_sources, train_dictionary
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, chunks, describe_sources, train_dictionary
 from placerec.words import write_stream, write_vocabulary
 from placerec.words.tokenize import tokenize
 
@@ -42,7 +42,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
             (images[0].parent / f"t{1000 + number}.000000_x0.000000_y0.000000_a0.000000.png").hardlink_to(
                 images[number % 20]
             )
-    train_dictionary([root / str(FEW)], root / "words.npz", spec=SPEC, size=2, epochs=2)
+    train_dictionary([root / str(FEW)], root / "words.npz", spec=SPEC, options=DictionaryOptions(size=2, epochs=2))
     return root
 
 
@@ -84,12 +84,14 @@ def test_words_are_learned_from_a_stream_in_bounded_memory(monkeypatch: pytest.M
         return give
 
     def fit(n: int) -> Dictionary:
-        return Dictionary.fit(pieces(n), spec=spec, size=3, epochs=2)
+        return Dictionary.fit(pieces(n), spec=spec, options=DictionaryOptions(size=3, epochs=2))
 
     fit(100)
     few, many = peak(lambda: fit(10_000)), peak(lambda: fit(100_000))
     assert (many - few) / 90_000 < 12, "4 bytes are promised, and a row has 96"
-    whole = Dictionary.fit(np.concatenate(list(pieces(10_000)())), spec=spec, size=3, epochs=2)
+    whole = Dictionary.fit(
+        np.concatenate(list(pieces(10_000)())), spec=spec, options=DictionaryOptions(size=3, epochs=2)
+    )
     assert fit(10_000).fingerprint == whole.fingerprint
 
 

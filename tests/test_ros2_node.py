@@ -12,7 +12,7 @@ import pytest
 from conftest import ROOT
 from helpers.small_world import write_images
 
-from placerec import read_stream, tokenize, train_dictionary, train_lm
+from placerec import DictionaryOptions, read_stream, tokenize, train_dictionary, train_lm
 from placerec.model import load_recognizer
 
 NODE = ROOT / "docs/examples/ros2_node.py"
@@ -114,7 +114,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, graph: Graph, messages: list[Compr
 
 def test_the_node_publishes_what_the_recognizer_believes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = write_images(tmp_path / "run")
-    train_dictionary([run], tmp_path / "words.npz", size=3)
+    train_dictionary([run], tmp_path / "words.npz", options=DictionaryOptions(size=3))
     tokenize([run], tmp_path / "words.npz", tmp_path / "tokens")
     train_lm([tmp_path / "tokens/run.tsv"], tmp_path / "model")
     messages = [

@@ -9,7 +9,7 @@ from placerec.arrays import Floats
 from placerec.hohmm import filter_stream, fixed_transition
 from placerec.lm import count_ngrams
 from placerec.model.train import Options, estimate_place
-from placerec.vision import Descriptors, DescriptorSpec, Dictionary
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions
 from placerec.words import Selection, Sentences, WordStream, sentences_per_place
 from placerec.words.tokenize import tokens_of
 
@@ -43,7 +43,9 @@ def trained(training: Descriptors, tests: Descriptors) -> Iterator[Trained]:
     """For every size and seed: words and Witten-Bell bigrams of the training, and what they say of the tests."""
     for size in SIZES:
         for seed in SEEDS:
-            dictionary = Dictionary.fit(training.values, spec=DescriptorSpec(), size=size, seed=seed)
+            dictionary = Dictionary.fit(
+                training.values, spec=DescriptorSpec(), options=DictionaryOptions(size=size, seed=seed)
+            )
             streams, others = tokens_of(training, dictionary), tokens_of(tests, dictionary)
             sentences = sentences_per_place(streams, Selection())
             counts = [

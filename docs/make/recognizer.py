@@ -19,7 +19,7 @@ from placerec.evaluation import Evaluation, evaluate
 from placerec.hohmm import Beliefs, Recognizer, Transition, fixed_transition, learned_transition
 from placerec.lm import count_ngrams
 from placerec.model.train import Options, estimate_place
-from placerec.vision import Dictionary
+from placerec.vision import Dictionary, DictionaryOptions
 from placerec.words import WordStream, parse_selection, place_steps, sentences_per_place
 from placerec.words.tokenize import tokens_of
 
@@ -81,7 +81,9 @@ def maps(folder: Path, test: Sequence[str]) -> Iterator[Found]:
         whole: Found = {}
         for tested in fold_names(frames, test):
             training = part(frames, [name for name in names if name not in tested])
-            dictionary = Dictionary.fit(training.values, spec=frames.spec, size=SIZE, seed=seed)
+            dictionary = Dictionary.fit(
+                training.values, spec=frames.spec, options=DictionaryOptions(size=SIZE, seed=seed)
+            )
             streams = tokens_of(training, dictionary), tokens_of(part(frames, tested), dictionary)
             for key, beliefs in decoded(*streams, dictionary.vocabulary).items():
                 whole.setdefault(key, []).extend(beliefs)

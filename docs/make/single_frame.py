@@ -15,7 +15,7 @@ import numpy as np
 
 from placerec import DescriptorSpec, Dictionary, describe, find_sequences
 from placerec.arrays import Mask
-from placerec.vision import Descriptors
+from placerec.vision import Descriptors, DictionaryOptions
 
 SIZE = 20
 SEEDS = range(5)
@@ -56,7 +56,7 @@ def folds(frames: Descriptors, test: Sequence[str]) -> list[Mask]:
 def fitted(frames: Descriptors, tests: Mask) -> Iterator[Dictionary]:
     """Five maps of the frames that do not test."""
     for seed in SEEDS:
-        yield Dictionary.fit(frames.values[~tests], spec=frames.spec, size=SIZE, seed=seed)
+        yield Dictionary.fit(frames.values[~tests], spec=frames.spec, options=DictionaryOptions(size=SIZE, seed=seed))
 
 
 def answering(dictionary: Dictionary, units: str) -> Dictionary:

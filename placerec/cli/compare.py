@@ -8,7 +8,7 @@ import click
 from placerec.cli.options import PATH, output_option, progress_bar, reading_options, talk_options, usage
 
 if TYPE_CHECKING:
-    from placerec.frames import Reading
+    from placerec.frames import SourceOptions
 
 
 @click.command(epilog="Example: placerec compare RUNS/ --test RUNS/run3 --test RUNS/run7 -o out/")
@@ -46,7 +46,7 @@ def compare(
     size: int,
     seed: int,
     cache: Path | None,
-    reading: "Reading",
+    source_options: "SourceOptions",
     out: Path,
 ) -> None:
     """Run every method on the same test sequences.
@@ -61,6 +61,14 @@ def compare(
     with usage("--methods"):
         chosen = check_methods(None if methods is None else methods.split(","))
     found = run(
-        train, tests, out, methods=chosen, size=size, seed=seed, reading=reading, cache=cache, progress=progress_bar
+        train,
+        tests,
+        out,
+        methods=chosen,
+        size=size,
+        seed=seed,
+        source_options=source_options,
+        cache=cache,
+        progress=progress_bar,
     )
     click.echo(format_comparison(found))

@@ -21,7 +21,7 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from placerec.frames import Reading
+    from placerec.frames import SourceOptions
     from placerec.model import Decoding
 
 # What stands in placerec.methods.METHODS, where reading it would load numpy.
@@ -73,7 +73,7 @@ def decode(
     tokens: tuple[Path | str, ...],
     model: Path,
     words: Path | None,
-    reading: "Reading",
+    source_options: "SourceOptions",
     live: bool,
     method: str,
     scorer: str,
@@ -103,7 +103,7 @@ def decode(
             model,
             words=words,
             method=method,
-            reading=reading,
+            source_options=source_options,
             options=options,
             scorer=scorer,
             as_json=as_json,
@@ -131,7 +131,7 @@ def decode(
             method=method,
             words=words,
             out=out,
-            reading=reading,
+            source_options=source_options,
             options=options,
             scorer=scorer,
             as_json=as_json,

@@ -15,7 +15,7 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from placerec.frames import Reading
+    from placerec.frames import SourceOptions
     from placerec.jobs import Executor
     from placerec.vision import DescriptorSpec
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @talk_options
 def describe(
     sources: tuple[Path, ...],
-    reading: "Reading",
+    source_options: "SourceOptions",
     spec: "DescriptorSpec | None",
     matrix: Path | None,
     out: Path,
@@ -43,4 +43,6 @@ def describe(
     from placerec.vision import describe_sources
 
     with progress_bar("describe") as progress:
-        describe_sources(sources, out, spec=spec, matrix=matrix, reading=reading, work=work, progress=progress)
+        describe_sources(
+            sources, out, spec=spec, matrix=matrix, source_options=source_options, work=work, progress=progress
+        )

@@ -123,7 +123,7 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def source_arguments(function: Command) -> Command:
-    """SOURCE..., and how it is read. The command gets `sources` and `reading`."""
+    """SOURCE..., and how it is read. The command gets `sources` and `source_options`."""
     function = reading_options()(function)
     return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH_OR_STREAM)(function)
 
@@ -192,7 +192,7 @@ def work_options(function: Command) -> Command:
 
 
 def reading_options(note: str = "") -> Callable[[Command], Command]:
-    """--format, --every, --topic, --labels: how sources are to be read. The command gets `reading`."""
+    """--format, --every, --topic, --labels: how sources are to be read. The command gets `source_options`."""
 
     def decorated(function: Command) -> Command:
         @click.option(
@@ -221,11 +221,11 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
         )
         @functools.wraps(function)
         def read(*args: Any, format_: str, every: int, topic: str | None, labels: Path | None, **options: Any) -> Any:
-            from placerec.frames.reading import Reading
+            from placerec.frames.sequence import SourceOptions
 
             with usage("--labels"):
-                reading = Reading(format_, every, topic, labels)
-            return function(*args, reading=reading, **options)
+                source_options = SourceOptions(format_, every, topic, labels)
+            return function(*args, source_options=source_options, **options)
 
         return read
 

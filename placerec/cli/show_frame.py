@@ -18,7 +18,7 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from placerec.frames import Reading
+    from placerec.frames import SourceOptions
 
 
 @click.command("show-frame", epilog="Example: placerec show-frame frame.png -w words.npz -o seen.png")
@@ -30,7 +30,12 @@ if TYPE_CHECKING:
 @json_option()
 @talk_options
 def show_frame(
-    image: Path, sources: tuple[Path, ...], reading: "Reading", words: Path, out: Path | None, as_json: bool
+    image: Path,
+    sources: tuple[Path, ...],
+    source_options: "SourceOptions",
+    words: Path,
+    out: Path | None,
+    as_json: bool,
 ) -> None:
     """Show what the dictionary sees in an image.
 
@@ -42,5 +47,5 @@ def show_frame(
     from placerec.inspection.frame import show_frame as run
 
     with progress_bar("describe") as progress:
-        view = run(image, words, sources, out, reading=reading, progress=progress)
+        view = run(image, words, sources, out, source_options=source_options, progress=progress)
     click.echo(json.dumps(view.to_json(), indent=2, ensure_ascii=False) if as_json else format_frame(view))

@@ -17,7 +17,7 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from placerec.frames import Reading
+    from placerec.frames import SourceOptions
 
 
 @click.command("show-words", epilog="Example: placerec show-words words.npz RUNS/ -o words.png")
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def show_words(
     words: Path,
     sources: tuple[Path, ...],
-    reading: "Reading",
+    source_options: "SourceOptions",
     descriptor: tuple[str, Path] | None,
     out: Path | None,
     as_json: bool,
@@ -46,5 +46,5 @@ def show_words(
 
     with progress_bar("describe") as progress:
         matrix = descriptor and descriptor[1]
-        table = run(words, sources, out, matrix=matrix, reading=reading, progress=progress)
+        table = run(words, sources, out, matrix=matrix, source_options=source_options, progress=progress)
     click.echo(json.dumps(table.to_json(), indent=2, ensure_ascii=False) if as_json else format_words(table))

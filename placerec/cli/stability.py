@@ -16,7 +16,7 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from placerec.frames import Reading
+    from placerec.frames import SourceOptions
 
 
 @click.command(epilog="Example: placerec stability RUNS/ -w words.npz -o stability.png")
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @json_option()
 @talk_options
 def stability(
-    sources: tuple[Path, ...], reading: "Reading", words: Path, seed: int, out: Path | None, as_json: bool
+    sources: tuple[Path, ...], source_options: "SourceOptions", words: Path, seed: int, out: Path | None, as_json: bool
 ) -> None:
     """Measure how stable the words are.
 
@@ -39,5 +39,5 @@ def stability(
     from placerec.inspection.word_stability import stability as run
 
     with progress_bar("stability") as progress:
-        found = run(sources, words, out, reading=reading, seed=seed, progress=progress)
+        found = run(sources, words, out, source_options=source_options, seed=seed, progress=progress)
     click.echo(json.dumps(found.to_json(), indent=2) if as_json else format_stability(found))

@@ -16,7 +16,7 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from placerec.frames import Reading
+    from placerec.frames import SourceOptions
     from placerec.jobs import Executor
 
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @talk_options
 def tokenize(
     sources: tuple[Path, ...],
-    reading: "Reading",
+    source_options: "SourceOptions",
     words: Path,
     descriptor: tuple[str, Path] | None,
     out: Path,
@@ -45,4 +45,12 @@ def tokenize(
     from placerec.words.tokenize import tokenize as run
 
     with progress_bar("tokenize") as progress:
-        run(sources, words, out, matrix=descriptor and descriptor[1], reading=reading, work=work, progress=progress)
+        run(
+            sources,
+            words,
+            out,
+            matrix=descriptor and descriptor[1],
+            source_options=source_options,
+            work=work,
+            progress=progress,
+        )

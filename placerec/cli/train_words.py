@@ -1,7 +1,7 @@
 """`placerec train-words`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,7 +17,7 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from placerec.frames import Reading
+    from placerec.frames import SourceOptions
     from placerec.jobs import Executor
     from placerec.vision import DescriptorSpec
 
@@ -82,20 +82,13 @@ if TYPE_CHECKING:
 @talk_options
 def train_words(
     sources: tuple[Path, ...],
-    reading: "Reading",
-    size: int,
-    components: int,
-    seed: int,
-    fraction: float,
-    epochs: int | None,
-    units: str,
-    rule: str,
-    width: float,
+    source_options: "SourceOptions",
     held_out: tuple[Path, ...],
     spec: "DescriptorSpec | None",
     matrix: Path | None,
     out: Path,
     work: "Executor",
+    **options: Any,
 ) -> None:
     """Learn visual words: PCA and a map of descriptors.
 
@@ -103,7 +96,7 @@ def train_words(
     folder of images (any, or laid out as in COLD, KTH-IDOL2 or VPC), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
     folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
     """
-    from placerec.vision import train_dictionary
+    from placerec.vision import DictionaryOptions, train_dictionary
 
     with progress_bar("describe") as progress:
         train_dictionary(
@@ -111,16 +104,9 @@ def train_words(
             out,
             spec=spec,
             matrix=matrix,
-            reading=reading,
-            work=work,
-            size=size,
-            components=components,
-            seed=seed,
-            fraction=fraction,
-            epochs=epochs,
-            units=units,
-            rule=rule,
-            width=width,
+            source_options=source_options,
+            options=DictionaryOptions(**options),
             held_out=held_out,
+            work=work,
             progress=progress,
         )

@@ -26,7 +26,7 @@ from placerec.frames import files_of
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.version import __version__
-from placerec.vision import Descriptors, DescriptorSpec, Dictionary, describe
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions, describe
 from placerec.vision.storage import read_npz, write_npz
 from placerec.words import WordStream
 from placerec.words.tokenize import tokens_of, write_tokens
@@ -205,7 +205,8 @@ class WordsJob:
         except VisionError:
             values = np.concatenate([one.load().values for one in self.train])
             spec = self.train[0].spec
-            Dictionary.fit(values, spec=spec, size=self.size, seed=self.seed, units=self.units).save(self.words)
+            options = DictionaryOptions(size=self.size, seed=self.seed, units=self.units)
+            Dictionary.fit(values, spec=spec, options=options).save(self.words)
         return Dictionary.load(self.words)
 
 

@@ -3,7 +3,6 @@
 from placerec.frames.find import find_sequences
 from placerec.frames.image import read_gray
 from placerec.frames.images import all_images, files_of, images_at
-from placerec.frames.reading import Reading
-from placerec.frames.sequence import Frame, Sequence
+from placerec.frames.sequence import Frame, Sequence, SourceOptions
 
-__all__ = ["Frame", "Reading", "Sequence", "all_images", "files_of", "find_sequences", "images_at", "read_gray"]
+__all__ = ["Frame", "Sequence", "SourceOptions", "all_images", "files_of", "find_sequences", "images_at", "read_gray"]

@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 from placerec.errors import SourceError
 from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt
 from placerec.frames.image import quiet
-from placerec.frames.reading import Reading
-from placerec.frames.sequence import Frame, Gray, Sequence
+from placerec.frames.sequence import Frame, Gray, Sequence, SourceOptions
 from placerec.frames.video import grabbed_gray
 
 if TYPE_CHECKING:
@@ -112,7 +111,7 @@ def is_camera(source: Path | str) -> bool:
     return str(source).startswith(PREFIX)
 
 
-def find_camera(sources: Iterable[Path | str], reading: Reading, endless: bool) -> Sequence | None:
+def find_camera(sources: Iterable[Path | str], options: SourceOptions, endless: bool) -> Sequence | None:
     """The camera that is the only one of `sources`, None if there is no camera among them.
 
     Raises SourceError for a camera beside other sources, one that is named in no way that can be understood, and any
@@ -122,7 +121,7 @@ def find_camera(sources: Iterable[Path | str], reading: Reading, endless: bool) 
     cameras = [str(source) for source in sources if is_camera(source)]
     if not cameras:
         return None
-    camera = Camera(cameras[0].removeprefix(PREFIX), reading.every)
+    camera = Camera(cameras[0].removeprefix(PREFIX), options.every)
     if not endless:
         raise SourceError(f"{camera}: a camera is for tokenize and decode alone; make a video with it, and name that")
     if len(sources) > 1:
@@ -130,7 +129,7 @@ def find_camera(sources: Iterable[Path | str], reading: Reading, endless: bool) 
     if not (camera.source.isdecimal() or camera.source.startswith("/") or re.match(r"\w+://.", camera.source)):
         slash = "; give an address as text, not as a path" if re.match(r"\w+:/", camera.source) else ""
         raise SourceError(f"{camera}: is no camera; name camera:0, camera:/dev/video0 or camera:rtsp://...{slash}")
-    if reading.labels or reading.topic:
+    if options.labels or options.topic:
         raise SourceError(f"{camera}: is a camera, which has neither labels nor topics; leave them out")
     return Sequence(camera.name, [], camera.path, camera)
 

@@ -16,10 +16,9 @@ from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames
 from placerec.frames.intervals import find_intervals
 from placerec.frames.naming import own_name, unique_names
 from placerec.frames.places import check_place, check_twins, read_places
-from placerec.frames.reading import Reading
 from placerec.frames.recordings import WANTED as RECORDED
 from placerec.frames.recordings import is_recording, read_recording
-from placerec.frames.sequence import Sequence
+from placerec.frames.sequence import Sequence, SourceOptions
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +42,7 @@ class _Found:
 
 
 def find_sequences(
-    sources: Iterable[Path | str], *, reading: Reading = Reading(), endless: bool = False
+    sources: Iterable[Path | str], *, options: SourceOptions = SourceOptions(), endless: bool = False
 ) -> list[Sequence]:
     """The sequences in `sources`, in the order given, within a source in natural order; no image is decoded.
 
@@ -54,28 +53,30 @@ def find_sequences(
     bag without rosbags.
     """
     sources = [sources] if isinstance(sources, str | Path) else list(sources)
-    if camera := find_camera(sources, reading, endless):
+    if camera := find_camera(sources, options, endless):
         return [camera]
     paths = [Path(source) for source in sources]
-    found = [item for path in paths for item in _in_source(path, reading.format)]
+    found = [item for path in paths for item in _in_source(path, options.format)]
     _check_twice(found)
-    _tell_unused(found, reading)
+    _tell_unused(found, options)
     own = [image_list.NAME if item.folder == STREAM else own_name(item.folder) for item in found]
     names = unique_names([(name, item.folder) for name, item in zip(own, found, strict=True)], SourceError)
     alone = sum(_is_recorded(item) for item in found) == 1
-    read = [_read(item, name, reading, alone=alone) for name, item in zip(names, found, strict=True)]
+    read = [_read(item, name, options, alone=alone) for name, item in zip(names, found, strict=True)]
     check_twins(chain.from_iterable(positions for _, positions in read))
     return [sequence for sequence, _ in read]
 
 
-def _read(item: _Found, name: str, reading: Reading, *, alone: bool) -> tuple[Sequence, Iterable[tuple[str, str]]]:
+def _read(
+    item: _Found, name: str, options: SourceOptions, *, alone: bool
+) -> tuple[Sequence, Iterable[tuple[str, str]]]:
     """A sequence, and each of its places with the file and line, or the folder, that names it."""
     if item.folder == STREAM:
         frames, where = image_list.read_list()
-        return Sequence(name, frames[:: reading.every], item.folder), where
+        return Sequence(name, frames[:: options.every], item.folder), where
     if _is_recorded(item):
-        intervals = find_intervals(item.camera, name, reading.labels, alone=alone)
-        frames, recording = read_recording(item.camera, intervals, reading)
+        intervals = find_intervals(item.camera, name, options.labels, alone=alone)
+        frames, recording = read_recording(item.camera, intervals, options)
         return Sequence(name, frames, item.folder, recording), intervals.positions() if intervals else ()
     labels = None
     if item.places:
@@ -86,7 +87,7 @@ def _read(item: _Found, name: str, reading: Reading, *, alone: bool) -> tuple[Se
             if from_vpc
             else read_places(item.places, frozenset(item.images))
         )
-    files = read_frames(item.camera, item.images, labels=labels, place=item.place)[:: reading.every]
+    files = read_frames(item.camera, item.images, labels=labels, place=item.place)[:: options.every]
     if labels:
         return Sequence(name, files, item.folder), labels.positions()
     where = [(item.place, str(item.folder))] if item.place else [(f.place, str(f.path)) for f in files if f.place]
@@ -97,11 +98,11 @@ def _is_recorded(item: _Found) -> bool:
     return not item.images and item.folder != STREAM
 
 
-def _tell_unused(found: list[_Found], reading: Reading) -> None:
-    if reading.labels and found and not any(map(_is_recorded, found)):
-        log.warning("%s: labels videos and bags, and no source is one; not read", reading.labels)
-    if reading.topic and found and not any(is_bag(item.camera) for item in found):
-        log.warning("topic %s: no source is a bag", reading.topic)
+def _tell_unused(found: list[_Found], options: SourceOptions) -> None:
+    if options.labels and found and not any(map(_is_recorded, found)):
+        log.warning("%s: labels videos and bags, and no source is one; not read", options.labels)
+    if options.topic and found and not any(is_bag(item.camera) for item in found):
+        log.warning("topic %s: no source is a bag", options.topic)
 
 
 def _in_source(source: Path, format: str) -> list[_Found]:

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from placerec.frames import bag, video
 from placerec.frames.intervals import Intervals
-from placerec.frames.reading import Reading
-from placerec.frames.sequence import Frame, Recording
+from placerec.frames.sequence import Frame, Recording, SourceOptions
 
 WANTED = "videos (" + " ".join(f"*{suffix}" for suffix in video.SUFFIXES) + ") and bags (*.bag *.mcap *.db3)"
 
@@ -16,18 +15,18 @@ def is_recording(path: Path) -> bool:
     return bag.is_bag(path) or (path.is_file() and path.suffix.lower() in video.SUFFIXES)
 
 
-def read_recording(path: Path, labels: Intervals | None, reading: Reading) -> tuple[tuple[Frame, ...], Recording]:
+def read_recording(path: Path, labels: Intervals | None, options: SourceOptions) -> tuple[tuple[Frame, ...], Recording]:
     """The frames of a video or a bag in order of time, called after their numbers, and what their images come from.
 
     Raises as `video.list_times` and `bag.list_bag` do.
     """
     if bag.is_bag(path):
-        topic, ranks, stamps = bag.list_bag(path, reading.topic)
-        frames = _frames(path, stamps, labels, reading.every)
-        return frames, bag.Bag(path, topic, reading.every, ranks, frames)
+        topic, ranks, stamps = bag.list_bag(path, options.topic)
+        frames = _frames(path, stamps, labels, options.every)
+        return frames, bag.Bag(path, topic, options.every, ranks, frames)
     times = video.list_times(path)
-    frames = _frames(path, times, labels, reading.every)
-    return frames, video.Video(path, reading.every, times, frames)
+    frames = _frames(path, times, labels, options.every)
+    return frames, video.Video(path, options.every, times, frames)
 
 
 def _frames(path: Path, times: Sequence[float], labels: Intervals | None, every: int) -> tuple[Frame, ...]:

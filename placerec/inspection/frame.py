@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from placerec.arrays import Floats, Ints, Singles
 from placerec.evaluation.summary import percent, shorten
 from placerec.figures.canvas import MARGIN, figure_file, panel, picture_file, write_line
-from placerec.frames import Reading, Sequence, read_gray
+from placerec.frames import Sequence, SourceOptions, read_gray
 from placerec.frames.sequence import Gray
 from placerec.inspection.words import WordTable, look_up, typical_images
 from placerec.jobs import Progress
@@ -75,7 +75,7 @@ def show_frame(
     sources: Iterable[Path | str] = (),
     out: Path | str | None = None,
     *,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     progress: Progress | None = None,
 ) -> FrameView:
     """`placerec show-frame`: what a words.npz sees in an image, and which units are nearest to it.
@@ -88,7 +88,7 @@ def show_frame(
         view = view_frame(image, dictionary)
         sequences: list[Sequence] = []
         if sources := list(sources):
-            table, sequences = look_up(sources, dictionary, reading, progress)
+            table, sequences = look_up(sources, dictionary, source_options, progress)
             view = replace(view, table=table)
         if picture is not None:
             typical = {} if view.table is None else typical_images(view.table, sequences, view.nearest)

@@ -20,7 +20,7 @@ from placerec.figures.canvas import (
     place_colours,
     write_line,
 )
-from placerec.frames import Reading
+from placerec.frames import SourceOptions
 from placerec.frames.sequence import Gray
 from placerec.inspection.words import WordTable, look_up, typical_images, word_sentences
 from placerec.jobs import Progress
@@ -67,7 +67,7 @@ def show_words(
     out: Path | str | None = None,
     *,
     matrix: Path | str | None = None,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     progress: Progress | None = None,
 ) -> WordTable:
     """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
@@ -78,7 +78,7 @@ def show_words(
     """
     with picture_file(out) as picture:
         dictionary = Dictionary.load(words)
-        table, sequences = look_up(sources, dictionary, reading, progress, matrix)
+        table, sequences = look_up(sources, dictionary, source_options, progress, matrix)
         if picture is not None:
             images = typical_images(table, sequences)
             draw_word_sheet(table, images, picture, title=f"The words of {Path(words).name}")

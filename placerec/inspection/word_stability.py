@@ -8,7 +8,7 @@ import numpy as np
 
 from placerec.evaluation.summary import percent
 from placerec.figures.canvas import figure_file, picture_file
-from placerec.frames import Reading, find_sequences
+from placerec.frames import SourceOptions, find_sequences
 from placerec.jobs import Progress
 from placerec.vision import Dictionary
 from placerec.vision.stability import Stability, word_changes
@@ -23,7 +23,7 @@ def stability(
     words: Path | str,
     out: Path | str | None = None,
     *,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Stability:
@@ -34,7 +34,7 @@ def stability(
     """
     with picture_file(out) as picture:
         dictionary = Dictionary.load(words)
-        found = word_changes(find_sequences(sources, reading=reading), dictionary, seed=seed, progress=progress)
+        found = word_changes(find_sequences(sources, options=source_options), dictionary, seed=seed, progress=progress)
         if picture is not None:
             plot_stability(found, picture)
     return found

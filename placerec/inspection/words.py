@@ -10,7 +10,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import SourceError
 from placerec.evaluation.summary import percent, shorten
-from placerec.frames import Reading, Sequence, find_sequences, images_at
+from placerec.frames import Sequence, SourceOptions, find_sequences, images_at
 from placerec.frames.sequence import Gray
 from placerec.frames.table import FrameTable
 from placerec.jobs import Progress
@@ -100,12 +100,12 @@ class WordTable:
 def look_up(
     sources: Iterable[Path | str],
     dictionary: Dictionary,
-    reading: Reading,
+    source_options: SourceOptions,
     progress: Progress | None,
     matrix: Path | str | None = None,
 ) -> tuple[WordTable, list[Sequence]]:
     """The table of the frames of some sources, and their sequences. Raises as `find_sequences` and `describe`."""
-    sequences = find_sequences(sources, reading=reading)
+    sequences = find_sequences(sources, options=source_options)
     return word_table(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary), sequences
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import whole_folder, write_text
-from placerec.frames import Reading
+from placerec.frames import SourceOptions
 from placerec.hohmm import (
     Belief,
     BeliefRow,
@@ -41,7 +41,7 @@ def decode(
     method: str = HOHMM,
     words: Path | str | None = None,
     out: Path | str | None = None,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     options: Decoding = PAPER,
     scorer: str = "native",
     as_json: bool = False,
@@ -49,9 +49,9 @@ def decode(
 ) -> list[Beliefs]:
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
-    `sources`: token streams, or image sources (`reading`) if `words` (a words.npz) is given. Without `out` there must
-    be one sequence only; explanations are written there, as NAME.explain.jsonl. `method`: one of `METHODS`. Raises
-    ModelError or StreamError for what cannot be read or does not belong together.
+    `sources`: token streams, or image sources (`source_options`) if `words` (a words.npz) is given. Without `out` there
+    must be one sequence only; explanations are written there, as NAME.explain.jsonl. `method`: one of `METHODS`.
+    Raises ModelError or StreamError for what cannot be read or does not belong together.
     """
 
     def opened() -> tuple[SequenceDecoder, list[WordStream]]:
@@ -67,7 +67,7 @@ def decode(
                 raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
         dictionary = Dictionary.load(words)
         decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
-        return decoder, streams_of(sources, dictionary, reading=reading, progress=progress)
+        return decoder, streams_of(sources, dictionary, source_options=source_options, progress=progress)
 
     if out is None:
         if options.explain:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from placerec.errors import ModelError, StreamError, VisionError
-from placerec.frames import Frame, Reading, Sequence, find_sequences
+from placerec.frames import Frame, Sequence, SourceOptions, find_sequences
 from placerec.frames.camera import Camera
 from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt, paced
 from placerec.frames.images import all_images
@@ -69,7 +69,7 @@ def decode_live(
     *,
     words: Path | str,
     method: str = HOHMM,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     options: Decoding = PAPER,
     scorer: str = "native",
     as_json: bool = False,
@@ -88,7 +88,7 @@ def decode_live(
         raise StreamError(f"{source}: is a token stream, and live decoding is of images; name a camera or a video")
     dictionary = Dictionary.load(words)
     decoder = make_decoder(method, load_model(model), options=options, scorer=scorer, dictionary=dictionary)
-    sequences = find_sequences([source], reading=reading, endless=True)
+    sequences = find_sequences([source], options=source_options, endless=True)
     if len(sequences) > 1:
         raise StreamError(f"{source}: holds {len(sequences)} sequences; name one of them to be played live")
     header = None if as_json else format_header(decoder.places, unknown=decoder.asks_unknown)

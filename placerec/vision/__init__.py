@@ -2,7 +2,7 @@
 
 from placerec.vision.centrist import centrist
 from placerec.vision.describe import Descriptors, describe, save_descriptors
-from placerec.vision.dictionary import Dictionary
+from placerec.vision.dictionary import Dictionary, DictionaryOptions
 from placerec.vision.gist import gist
 from placerec.vision.images import fit_image
 from placerec.vision.sources import describe_sources, train_dictionary
@@ -13,6 +13,7 @@ __all__ = [
     "DescriptorSpec",
     "Descriptors",
     "Dictionary",
+    "DictionaryOptions",
     "centrist",
     "describe",
     "describe_sources",

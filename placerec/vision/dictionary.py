@@ -37,8 +37,14 @@ _ARRAYS = {  # name -> type and axes: d values, k components, K units
 
 
 @dataclass(frozen=True)
-class Training:
-    """How a dictionary was asked for: the options of `train-words`."""
+class DictionaryOptions:
+    """How a dictionary of size x size words is learned: the options of `train-words`.
+
+    `components`: how many principal components the map sees. `fraction`: the share of the frames, drawn by `seed`,
+    that PCA and map see. `units`: answer with those that at least one training frame hit (`live`: no language model
+    can know the others), or with `all`. `rule`, `width`, `epochs`: how the map learns, see `train_som`. Raises
+    VisionError for a value that cannot be used.
+    """
 
     size: int = 10
     components: int = 80
@@ -94,7 +100,7 @@ class Dictionary:
     pca: Pca
     codebook: NDArray[np.float32]
     hits: NDArray[np.int64]
-    training: Training
+    training: DictionaryOptions
     quality: Quality
     sequences: tuple[str, ...] = ()
 
@@ -104,46 +110,44 @@ class Dictionary:
         descriptors: Source,
         *,
         spec: DescriptorSpec,
-        size: int = 10,
-        components: int = 80,
-        seed: int = 0,
-        fraction: float = 1.0,
-        epochs: int | None = None,
-        units: str = "live",
-        rule: str = "batch",
-        width: float = WIDTH,
+        options: DictionaryOptions = DictionaryOptions(),
         progress: EpochProgress | None = None,
         work: Executor | None = None,
     ) -> "Dictionary":
         """Learn size x size words from descriptors (n, spec.length) in time order (readings A25-A29).
 
         `descriptors`: an array, a memory map, or a function that gives an iterator over float32 pieces of any length
-        and is called three times: the memory then does not grow with n but for four bytes a frame.
-        `fraction`: the share of the frames, drawn by the seed, that PCA and map see. `units`: answer with those
-        that at least one training frame hit (`live`: no language model can know the others), or with `all`.
-        `rule`, `width`, `epochs`: how the map learns, see `train_som`. `progress`: called with epoch, epochs and
-        quantisation error. `work`: whose other machines, if any, take a share of the sums (`cluster.cluster`). Same
-        descriptors, options and seed: same bytes, whoever does the work.
-        Raises VisionError for unusable descriptors or options.
+        and is called three times: the memory then does not grow with n but for four bytes a frame. `progress`: called
+        with epoch, epochs and quantisation error. `work`: whose other machines, if any, take a share of the sums
+        (`cluster.cluster`). The bytes that `save` writes depend on descriptors and options alone, whoever does the
+        work. Raises VisionError for unusable descriptors.
         """
-        training = Training(size, components, seed, fraction, epochs, units, rule, width)
-        rng = np.random.Generator(np.random.PCG64(seed))
+        size = options.size
+        rng = np.random.Generator(np.random.PCG64(options.seed))
         source = _checked(descriptors, spec)
         frames = None
-        if fraction < 1:
+        if options.fraction < 1:
             frames = len(source) if isinstance(source, np.ndarray) else sum(map(len, chunks(source)))
-            source = _drawn(source, frames, fraction, rng)
+            source = _drawn(source, frames, options.fraction, rng)
         data = moments(source, work)
-        pca = fit_pca(data, components)
+        pca = fit_pca(data, options.components)
         if data.n < size * size:
             log.warning("%d frames cannot fill the %d words of a map of size %d", data.n, size * size, size)
         # A fifth of the descriptors, for many passes.
         with stored(projected(source, pca), work) as codes:
-            som = train_som(codes, size, rng=rng, rule=rule, width=width, epochs=epochs, progress=progress)
+            som = train_som(
+                codes,
+                size,
+                rng=rng,
+                rule=options.rule,
+                width=options.width,
+                epochs=options.epochs,
+                progress=progress,
+            )
             got = map_quality(codes, som.codebook, som.hits)
         errors = got.quantisation_error, got.topographic_error, got.entropy, got.dead
         quality = Quality(frames or data.n, data.n, som.epochs, pca.explained, pca.needed, *errors)
-        return cls(spec, pca, som.codebook, som.hits, training, quality)
+        return cls(spec, pca, som.codebook, som.hits, options, quality)
 
     def __repr__(self) -> str:
         size, components = self.training.size, len(self.pca.components)
@@ -284,7 +288,7 @@ def _restored(arrays: Arrays, meta: dict[str, Any]) -> Dictionary:
     if meta.get("version") != VERSION:
         raise VisionError(f"it has format version {meta.get('version')}, and this placerec reads {VERSION}")
     try:
-        spec, training = DescriptorSpec(**meta["descriptor"]), Training(**meta["training"])
+        spec, training = DescriptorSpec(**meta["descriptor"]), DictionaryOptions(**meta["training"])
         quality = Quality(**meta["quality"])
         sequences = tuple(map(str, meta.get("sequences", ())))
     except (KeyError, TypeError) as error:

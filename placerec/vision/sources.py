@@ -8,14 +8,13 @@ from pathlib import Path
 
 from placerec.errors import OutputError
 from placerec.files import whole_file
-from placerec.frames import Reading, Sequence, files_of, find_sequences
+from placerec.frames import Sequence, SourceOptions, files_of, find_sequences
 from placerec.jobs import Executor, Progress
 from placerec.journal import open_journal
 from placerec.vision.chunks import Source
 from placerec.vision.describe import describe, keep_described, save_descriptors
-from placerec.vision.dictionary import Dictionary, Quality
+from placerec.vision.dictionary import Dictionary, DictionaryOptions, Quality
 from placerec.vision.quality import MapQuality
-from placerec.vision.som import WIDTH
 from placerec.vision.spec import DescriptorSpec
 
 log = logging.getLogger(__name__)
@@ -27,7 +26,7 @@ def describe_sources(
     *,
     spec: DescriptorSpec | None = None,
     matrix: Path | str | None = None,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
@@ -39,7 +38,7 @@ def describe_sources(
     """
     # The file comes first: that it cannot be written must not be found out after an hour of images.
     with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
-        sequences = find_sequences(sources, reading=reading)
+        sequences = find_sequences(sources, options=source_options)
         _check_unread(Path(out), sequences, matrix)
         if matrix is not None:
             save_descriptors(describe(sequences, spec, matrix=matrix), unfinished)
@@ -54,27 +53,20 @@ def train_dictionary(
     *,
     spec: DescriptorSpec | None = None,
     matrix: Path | str | None = None,
-    reading: Reading = Reading(),
-    size: int = 10,
-    components: int = 80,
-    seed: int = 0,
-    fraction: float = 1.0,
-    epochs: int | None = None,
-    units: str = "live",
-    rule: str = "batch",
-    width: float = WIDTH,
+    source_options: SourceOptions = SourceOptions(),
+    options: DictionaryOptions = DictionaryOptions(),
     held_out: Iterable[Path | str] = (),
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> Dictionary:
     """Describe the frames of the sources, fit a dictionary to them (`Dictionary.fit`) and write it to `out`.
 
-    `spec`, `matrix`, `work`: as for `describe_sources`, which tells of memory and of killed runs, too. `held_out`:
-    sources that train nothing; how well the map represents them (`Dictionary.measure`) is noted. `progress` is called
+    `spec`, `matrix`, `work`: see `describe_sources`, which tells of memory and of killed runs, too. `held_out`: sources
+    that train nothing; how well the map represents them (`Dictionary.measure`) is noted. `progress` is called
     with frames described and in all. Raises as `describe_sources` and `Dictionary.fit` do.
     """
     with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
-        training, others = find_sequences(sources, reading=reading), find_sequences(held_out, reading=reading)
+        training, others = (find_sequences(some, options=source_options) for some in (sources, held_out))
         _check_unread(Path(out), [*training, *others], matrix)
         seen, unseen = (sum(len(sequence.frames) for sequence in some) for some in (training, others))
         tell = progress or (lambda done, total: None)
@@ -86,19 +78,7 @@ def train_dictionary(
             spec = spec or DescriptorSpec()
             kept = keep_described(training, spec, journal, work, lambda done, _: tell(done, seen + unseen))
             values = kept.pieces
-        dictionary = Dictionary.fit(
-            values,
-            spec=spec,
-            size=size,
-            components=components,
-            seed=seed,
-            fraction=fraction,
-            epochs=epochs,
-            units=units,
-            rule=rule,
-            width=width,
-            work=work,
-        )
+        dictionary = Dictionary.fit(values, spec=spec, options=options, work=work)
         dictionary = replace(dictionary, sequences=tuple(sequence.name for sequence in training))
         dictionary.save(unfinished)
         _report(dictionary)

@@ -7,8 +7,8 @@ from functools import partial
 from pathlib import Path
 
 from placerec.files import encoded, whole_folder, write_text
-from placerec.frames import Reading, find_sequences
 from placerec.frames import Sequence as FrameSequence
+from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.batches import Batch
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
@@ -29,7 +29,7 @@ def tokenize(
     out: Path | str,
     *,
     matrix: Path | str | None = None,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
@@ -43,7 +43,7 @@ def tokenize(
     dictionary = Dictionary.load(Path(words))
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
     with whole_folder(Path(out), OWNED) as folder, open_journal(Path(out)) as journal:
-        parts = _parts(sources, dictionary, matrix, reading, work, journal, progress)
+        parts = _parts(sources, dictionary, matrix, source_options, work, journal, progress)
         names, seen = _write(parts, dictionary, folder)
     log.info("%s: %d sequences, %d of %d words seen", out, len(names), len(seen), len(dictionary.vocabulary))
 
@@ -53,7 +53,7 @@ def streams_of(
     dictionary: Dictionary,
     *,
     matrix: Path | str | None = None,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> list[WordStream]:
@@ -62,7 +62,7 @@ def streams_of(
     `matrix`, `work`: as for `tokenize`. Raises VisionError for a dictionary that needs a matrix if there is none.
     """
     pieces: dict[str, list[WordStream]] = {}
-    for part in _parts(sources, dictionary, matrix, reading, work, None, progress):
+    for part in _parts(sources, dictionary, matrix, source_options, work, None, progress):
         pieces.setdefault(part.name, []).append(part)
     return [WordStream.concat(parts) for parts in pieces.values()]
 
@@ -95,13 +95,13 @@ def _parts(
     sources: Iterable[Path | str],
     dictionary: Dictionary,
     matrix: Path | str | None,
-    reading: Reading,
+    source_options: SourceOptions,
     work: Executor | None,
     journal: Journal | None,
     progress: Progress | None,
 ) -> Iterator[WordStream]:
     """Pieces of the token streams, those of a sequence one after the other."""
-    sequences = find_sequences(sources, reading=reading, endless=True)
+    sequences = find_sequences(sources, options=source_options, endless=True)
     names = set()
     if matrix is not None:
         parts = iter(tokens_of(describe(sequences, dictionary.spec, matrix=matrix), dictionary))

@@ -32,7 +32,7 @@ from placerec.cluster import cluster
 from placerec.frames import find_sequences
 from placerec.jobs import RemoteExecutor
 from placerec.model import train_lm
-from placerec.vision import DescriptorSpec, Dictionary, describe_sources
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe_sources
 from placerec.vision.chunks import stored
 from placerec.vision.pca import fit_pca, moments, project
 from placerec.vision.som import train_som
@@ -157,7 +157,7 @@ def jobs(sources: list[Path], rows: int, folder: Path) -> list[tuple[str, int, J
     spots = rng.normal(size=(300, spec.length))
     values = (spots[np.sort(rng.integers(300, size=rows))] + 0.3 * rng.normal(size=(rows, spec.length))).astype("f4")
     codes = np.tile(project(values, fit_pca(moments(values[:4096]))), (4, 1))
-    Dictionary.fit(values[:4096], spec=spec, size=SIDE, epochs=2).save(folder / "words.npz")
+    Dictionary.fit(values[:4096], spec=spec, options=DictionaryOptions(size=SIDE, epochs=2)).save(folder / "words.npz")
     words = Dictionary.load(folder / "words.npz")
     print(f"tokenize sends once, and counts among what it sends: {len(pickle.dumps(words))} bytes")
     (folder / "tokens").mkdir()

@@ -23,7 +23,7 @@ from placerec.frames.image import read_gray
 from placerec.hohmm import Recognizer
 from placerec.methods.decode import format_belief
 from placerec.model import load_recognizer, train_lm
-from placerec.vision import Dictionary
+from placerec.vision import Dictionary, DictionaryOptions
 from placerec.vision.gist import gist
 from placerec.vision.images import fit_image
 from placerec.vision.spec import DescriptorSpec
@@ -47,7 +47,9 @@ def make_dictionary(size: int) -> Dictionary:
     rng = np.random.default_rng(1)
     centres = rng.random((4 * size * size, 384)) * 0.2
     rows = centres[rng.integers(len(centres), size=20 * size * size)] + 0.02 * rng.random((20 * size * size, 384))
-    return Dictionary.fit(rows.astype(np.float32), spec=DescriptorSpec(), size=size, epochs=4)
+    return Dictionary.fit(
+        rows.astype(np.float32), spec=DescriptorSpec(), options=DictionaryOptions(size=size, epochs=4)
+    )
 
 
 def make_recognizer(folder: Path, dictionary: Dictionary) -> Recognizer:

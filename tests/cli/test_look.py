@@ -8,7 +8,7 @@ from click.testing import CliRunner, Result
 from helpers.small_world import write_images
 
 from placerec.cli import commands
-from placerec.vision import DescriptorSpec, train_dictionary
+from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
 from placerec.vision.stability import CHANGES
 
 
@@ -21,7 +21,9 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("world")
     for seed, name in enumerate(("seq1", "seq2")):
         write_images(root / "runs" / name, seed)
-    train_dictionary([root / "runs/seq1"], root / "words.npz", spec=DescriptorSpec(image_size=16), size=3)
+    train_dictionary(
+        [root / "runs/seq1"], root / "words.npz", spec=DescriptorSpec(image_size=16), options=DictionaryOptions(size=3)
+    )
     return root
 
 

@@ -12,7 +12,7 @@ import pytest
 from helpers.recordings import START, STEP, Message, compressed, cut, grays, jpeg, pictures, raw, stream, write_bag
 
 from placerec.errors import MissingExtraError, SourceError
-from placerec.frames import Reading, Sequence, find_sequences, images_at, read_gray
+from placerec.frames import Sequence, SourceOptions, find_sequences, images_at, read_gray
 from placerec.frames.sequence import Gray
 
 pytest.importorskip("rosbags")
@@ -20,7 +20,7 @@ TOPIC = "/camera/image_raw"
 
 
 def found(path: Path, topic: str | None = None, every: int = 1) -> Sequence:
-    (sequence,) = find_sequences([path], reading=Reading(topic=topic, every=every))
+    (sequence,) = find_sequences([path], options=SourceOptions(topic=topic, every=every))
     return sequence
 
 

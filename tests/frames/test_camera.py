@@ -14,7 +14,7 @@ from helpers.network_camera import jpegs, network_camera
 from helpers.small_world import write_images
 
 from placerec.errors import SourceError
-from placerec.frames import Reading, find_sequences
+from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.camera import Camera, is_camera
 
 
@@ -123,15 +123,15 @@ def test_a_network_camera_gives_what_it_sees(pictures: list[bytes], caplog: pyte
 
 def test_every_so_many_images(pictures: list[bytes]) -> None:
     with network_camera(pictures) as address:
-        (sequence,) = find_sequences([f"camera:{address}"], reading=Reading(every=5), endless=True)
+        (sequence,) = find_sequences([f"camera:{address}"], options=SourceOptions(every=5), endless=True)
         assert sequence.recording is not None
         assert [frame.name for frame, _ in sequence.recording.shots()] == ["000000", "000005", "000010"]
 
 
 def test_a_camera_has_neither_labels_nor_topics() -> None:
-    for reading in (Reading(labels=Path(__file__)), Reading(topic="/camera")):
+    for source_options in (SourceOptions(labels=Path(__file__)), SourceOptions(topic="/camera")):
         with pytest.raises(SourceError, match="camera:0: is a camera, which has neither labels nor topics"):
-            find_sequences(["camera:0"], reading=reading, endless=True)
+            find_sequences(["camera:0"], options=source_options, endless=True)
 
 
 def test_damaged_images_do_not_end_it(pictures: list[bytes]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from placerec.errors import SourceError
-from placerec.frames import Reading, Sequence, find_sequences, read_gray
+from placerec.frames import Sequence, SourceOptions, find_sequences, read_gray
 from placerec.frames.cold import parse_name
 from placerec.frames.places import read_places
 
@@ -161,7 +161,7 @@ def test_sequence_folder_and_std_cam_itself_are_the_same_sequence(dirty: Path) -
     expected = find_sequences([dirty])
     for source in (dirty / "seq3_cloudy1", inner, inner / "std_cam"):
         assert find_sequences([source]) == expected
-        assert find_sequences([source], reading=Reading("sequences")) == expected
+        assert find_sequences([source], options=SourceOptions("sequences")) == expected
 
 
 def test_equal_times_go_by_name(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from placerec.errors import SourceError
-from placerec.frames import Reading, find_sequences
+from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.folder import WANTED, natural_key
 from placerec.frames.recordings import WANTED as RECORDED
 
@@ -26,7 +26,7 @@ def labelled(root: Path, text: str) -> None:
 
 def failure(*sources: Path | str, format: str = "auto") -> str:
     with pytest.raises(SourceError) as error:
-        find_sequences(sources, reading=Reading(format))
+        find_sequences(sources, options=SourceOptions(format))
     return str(error.value)
 
 
@@ -124,7 +124,7 @@ def test_one_folder_per_place(rooms: Path, caplog: pytest.LogCaptureFixture) -> 
 
 
 def test_the_same_folders_as_sequences(rooms: Path, caplog: pytest.LogCaptureFixture) -> None:
-    found = find_sequences([rooms], reading=Reading("sequences"))
+    found = find_sequences([rooms], options=SourceOptions("sequences"))
     assert [(sequence.name, {frame.place for frame in sequence.frames}) for sequence in found] == [
         ("bath", {""}),
         ("kitchen", {""}),
@@ -135,7 +135,7 @@ def test_the_same_folders_as_sequences(rooms: Path, caplog: pytest.LogCaptureFix
 def test_places_can_be_asked_for(tmp_path: Path) -> None:
     make(tmp_path, "kitchen/t2.000000.jpeg", "kitchen/t1.000000.jpeg", "bath/t3.000000.jpeg")
     assert {frame.place for sequence in find_sequences([tmp_path]) for frame in sequence.frames} == {""}
-    (bath, kitchen) = find_sequences([tmp_path], reading=Reading("places"))
+    (bath, kitchen) = find_sequences([tmp_path], options=SourceOptions("places"))
     assert [(frame.time, frame.place) for frame in (*bath.frames, *kitchen.frames)] == [
         (3.0, "bath"),
         (1.0, "kitchen"),

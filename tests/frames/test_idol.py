@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.errors import SourceError
-from placerec.frames import Reading, find_sequences
+from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.cold import Pose
 from placerec.frames.idol import Named, parse_name
 
@@ -72,7 +72,7 @@ def test_the_whole_data_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_images_beside_each_other_and_labels_of_their_own(tmp_path: Path) -> None:
     run = make(tmp_path / "min_sunny2")
-    (sequence,) = find_sequences([run], reading=Reading(every=2))
+    (sequence,) = find_sequences([run], options=SourceOptions(every=2))
     assert (sequence.name, [frame.place for frame in sequence.frames]) == ("min_sunny2", ["CR", "EO"])
     (run / "places.lst").write_text(f"{NAMES[0]} printer\n")
     (sequence,) = find_sequences([run])

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from placerec.errors import SourceError
-from placerec.frames import Reading, Sequence, find_sequences
+from placerec.frames import Sequence, SourceOptions, find_sequences
 
 Listed = Callable[..., Sequence]
 
@@ -19,7 +19,7 @@ def given(monkeypatch: pytest.MonkeyPatch) -> Listed:
     def listed(text: str | bytes, every: int = 1) -> Sequence:
         data = text if isinstance(text, bytes) else text.encode()
         monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(data)))
-        (sequence,) = find_sequences(["-"], reading=Reading(every=every))
+        (sequence,) = find_sequences(["-"], options=SourceOptions(every=every))
         return sequence
 
     return listed

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.errors import SourceError
-from placerec.frames import Reading, find_sequences
+from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.intervals import Interval, Intervals, read_intervals
 
 LABELS = """\ufeff# run through the house
@@ -25,7 +25,7 @@ LABELS = """\ufeff# run through the house
 
 
 def places(path: Path, labels: Path | None = None, every: int = 1) -> list[str]:
-    (sequence,) = find_sequences([path], reading=Reading(labels=labels, every=every))
+    (sequence,) = find_sequences([path], options=SourceOptions(labels=labels, every=every))
     return [frame.place for frame in sequence.frames]
 
 
@@ -98,7 +98,7 @@ def test_where_labels_are_looked_for(
     beside = {sequence.name: sequence.frames[0].place for sequence in find_sequences([tmp_path])}
     assert beside == {"other": "", "a-run": "hall", "b-run": ""}
     caplog.clear()
-    named = find_sequences([tmp_path], reading=Reading(labels=given))
+    named = find_sequences([tmp_path], options=SourceOptions(labels=given))
     assert {sequence.name: sequence.frames[0].place for sequence in named} == {
         "other": "",
         "a-run": "",
@@ -107,13 +107,13 @@ def test_where_labels_are_looked_for(
     assert f"{tmp_path / 'a/other.mp4'}: no {given / 'other.labels'}; its frames have no label" in caplog.messages
     one = tmp_path / "a/run.labels"
     with pytest.raises(SourceError) as error:
-        find_sequences([tmp_path], reading=Reading(labels=one))
+        find_sequences([tmp_path], options=SourceOptions(labels=one))
     assert str(error.value) == f"{one}: is one file for several recordings; name a folder that holds other.labels"
     assert places(tmp_path / "b/run.mp4", one) == ["hall"] * 4
     monkeypatch.chdir(tmp_path / "a")
     assert places(Path("run.mp4")) == ["hall"] * 4
     with pytest.raises(SourceError, match="nowhere: no such file"):
-        Reading(labels=tmp_path / "nowhere")
+        SourceOptions(labels=tmp_path / "nowhere")
 
 
 def test_labels_and_topics_that_are_for_no_source_are_told_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -121,7 +121,7 @@ def test_labels_and_topics_that_are_for_no_source_are_told_of(tmp_path: Path, ca
     (tmp_path / "run/a.png").touch()
     labels = tmp_path / "x.labels"
     labels.touch()
-    find_sequences([tmp_path / "run"], reading=Reading(labels=labels, topic="/c"))
+    find_sequences([tmp_path / "run"], options=SourceOptions(labels=labels, topic="/c"))
     assert f"{labels}: labels videos and bags, and no source is one; not read" in caplog.messages
     assert "topic /c: no source is a bag" in caplog.messages
 

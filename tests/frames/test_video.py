@@ -16,7 +16,7 @@ from helpers.recordings import cut, decoded, pictures, write_video
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
-from placerec.frames import Frame, Reading, Sequence, find_sequences, images_at
+from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at
 from placerec.frames.sequence import Gray
 from placerec.frames.video import SUFFIXES, _decoded, _increasing, _walked, list_times
 
@@ -37,8 +37,8 @@ KINDS = [
 ]
 
 
-def found(path: Path, **reading: object) -> Sequence:
-    (sequence,) = find_sequences([path], reading=Reading(**reading))  # type: ignore[arg-type]
+def found(path: Path, **source_options: object) -> Sequence:
+    (sequence,) = find_sequences([path], options=SourceOptions(**source_options))  # type: ignore[arg-type]
     assert sequence.recording is not None
     return sequence
 
@@ -250,12 +250,12 @@ def test_a_video_beside_stamped_images_is_not_read(tmp_path: Path, caplog: pytes
 def test_every_holds_for_images_too(tmp_path: Path) -> None:
     for i in range(10):
         (tmp_path / f"{i}.png").touch()
-    (sequence,) = find_sequences([tmp_path], reading=Reading(every=4))
+    (sequence,) = find_sequences([tmp_path], options=SourceOptions(every=4))
     assert [frame.name for frame in sequence.frames] == ["0.png", "4.png", "8.png"]
     assert [type(frame) for frame in sequence.frames] == [Frame] * 3
     assert math.isnan(sequence.frames[0].time)
     with pytest.raises(SourceError, match="every 0 frames is not possible"):
-        Reading(every=0)
+        SourceOptions(every=0)
 
 
 def test_names_with_signs_of_ffmpeg_are_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

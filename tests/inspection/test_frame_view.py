@@ -12,7 +12,7 @@ from helpers.small_world import write_images
 from placerec.errors import SourceError
 from placerec.frames import find_sequences
 from placerec.inspection.frame import FrameView, energies, format_frame, show_frame, view_frame
-from placerec.vision import DescriptorSpec, Dictionary, describe, gist
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, gist
 
 SPEC = DescriptorSpec(image_size=16)
 
@@ -22,7 +22,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("world")
     write_images(root / "seq")
     values = describe(find_sequences([root / "seq"]), SPEC).values
-    Dictionary.fit(values, spec=SPEC, size=4).save(root / "words.npz")
+    Dictionary.fit(values, spec=SPEC, options=DictionaryOptions(size=4)).save(root / "words.npz")
     return root
 
 

@@ -17,7 +17,7 @@ from placerec.inspection import show_frame, show_words, stability, word_stabilit
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.word_stability import format_stability, plot_stability
 from placerec.inspection.words import WordTable
-from placerec.vision import DescriptorSpec, train_dictionary
+from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
 from placerec.vision.stability import ChangeResult, Stability
 
 RESULTS = (
@@ -33,7 +33,9 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("world")
     for seed, name in enumerate(("seq1", "seq2")):
         write_images(root / name, seed)
-    train_dictionary([root / "seq1"], root / "words.npz", spec=DescriptorSpec(image_size=16), size=4)
+    train_dictionary(
+        [root / "seq1"], root / "words.npz", spec=DescriptorSpec(image_size=16), options=DictionaryOptions(size=4)
+    )
     return root
 
 
@@ -142,7 +144,7 @@ def test_long_names_of_many_places_are_shortened_and_nothing_leaves_the_sheet(
 def test_what_is_not_gist_has_bars_and_no_roses(world: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     spec = DescriptorSpec(kind="centrist", image_size=16)
-    train_dictionary([world / "seq1"], tmp_path / "centrist.npz", spec=spec, size=3)
+    train_dictionary([world / "seq1"], tmp_path / "centrist.npz", spec=spec, options=DictionaryOptions(size=3))
     image = min((world / "seq1/std_cam").iterdir())
     show_frame(image, world / "words.npz", out=tmp_path / "roses.svg")
     show_frame(image, tmp_path / "centrist.npz", out=tmp_path / "bars.svg")
@@ -160,7 +162,7 @@ def test_words_of_a_matrix_are_shown_and_cannot_be_made_from_images(world: Path,
     pytest.importorskip("matplotlib")
     matrix, words = tmp_path / "rows.npy", tmp_path / "words.npz"
     np.save(matrix, np.random.default_rng(0).random((12, 20)).astype(np.float32))
-    train_dictionary([world / "seq1"], words, matrix=matrix, size=3)
+    train_dictionary([world / "seq1"], words, options=DictionaryOptions(size=3), matrix=matrix)
     found = show_words(words, [world / "seq1"], tmp_path / "a.png", matrix=matrix)
     assert found.is_training
     assert (tmp_path / "a.png").stat().st_size > 5_000

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
-from placerec.frames import Reading, find_sequences
+from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.table import FrameTable
 from placerec.inspection.words import WordTable, format_words, typical_images, u_matrix, word_table
-from placerec.vision import Descriptors, DescriptorSpec, Dictionary
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions
 
 SPEC = DescriptorSpec(image_size=16)
 
@@ -38,7 +38,7 @@ def described(n: int = 60, seed: int = 1, places: tuple[str, ...] = ("b", "a", "
 
 
 def dictionary(units: str = "live") -> Dictionary:
-    return Dictionary.fit(sample(40, 0), spec=SPEC, size=7, units=units)
+    return Dictionary.fit(sample(40, 0), spec=SPEC, options=DictionaryOptions(size=7, units=units))
 
 
 @pytest.mark.parametrize("units", ["live", "all"])
@@ -94,7 +94,7 @@ def test_the_typical_frames_of_sequences_of_equal_image_names_are_told_apart(tmp
         path = tmp_path / ("one" if level < 30 else "two") / f"f{level % 30}.png"
         path.parent.mkdir(exist_ok=True)
         cv2.imwrite(str(path), np.full((8, 8), level, np.uint8))
-    sequences = find_sequences([tmp_path / "one", tmp_path / "two"], reading=Reading("sequences"))
+    sequences = find_sequences([tmp_path / "one", tmp_path / "two"], options=SourceOptions("sequences"))
     table = word_table(frames, dictionary())
     levels = {unit: int(image[0, 0]) for unit, image in typical_images(table, sequences).items()}
     assert levels == {unit: frame for unit, frame in enumerate(table.typical.tolist()) if frame >= 0}

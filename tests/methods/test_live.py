@@ -23,7 +23,7 @@ from placerec.hohmm import Belief, Recognizer, format_beliefs
 from placerec.methods import LiveReport, decode, decode_live, follow_live, load_decoder
 from placerec.model import Decoding, train_lm
 from placerec.model.decoding import PAPER
-from placerec.vision import Dictionary
+from placerec.vision import Dictionary, DictionaryOptions
 from placerec.vision.sources import train_dictionary
 from placerec.words import read_stream
 from placerec.words.tokenize import tokenize
@@ -37,7 +37,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("live")
     for seed, name in enumerate(("seq1", "seq2")):
         write_images(root / "runs" / name, seed)
-    train_dictionary([root / "runs"], root / "words.npz", size=3)
+    train_dictionary([root / "runs"], root / "words.npz", options=DictionaryOptions(size=3))
     tokenize([root / "runs"], root / "words.npz", root / "tokens")
     train_lm([root / "tokens/seq1.tsv"], root / "model")
     return root

@@ -14,6 +14,7 @@ from placerec.jobs import workers
 from placerec.vision import (
     DescriptorSpec,
     Dictionary,
+    DictionaryOptions,
     describe,
     describe_sources,
     fit_image,
@@ -130,12 +131,14 @@ def test_sources_to_files(tmp_path: Path) -> None:
             [tmp_path / "run"],
             tmp_path / "w.npz",
             spec=DescriptorSpec(image_size=32),
-            size=2,
-            components=5,
-            seed=4,
+            options=DictionaryOptions(size=2, components=5, seed=4),
             progress=lambda done, total: told.append(done),
         )
-        fitted = Dictionary.fit(file["descriptors"], spec=DescriptorSpec(image_size=32), size=2, components=5, seed=4)
+        fitted = Dictionary.fit(
+            file["descriptors"],
+            spec=DescriptorSpec(image_size=32),
+            options=DictionaryOptions(size=2, components=5, seed=4),
+        )
     assert told == [12]
     assert Dictionary.load(tmp_path / "w.npz").fingerprint == made.fingerprint == fitted.fingerprint
 
@@ -146,7 +149,7 @@ def test_the_second_lap_of_a_real_corridor_is_told_by_the_words_of_the_first(sha
     rows, places = described.table.by_sequence(), np.array(described.places)
     first, second = described.values[rows["lap1"]], described.values[rows["lap2"]]
     seen, asked = places[rows["lap1"]], places[rows["lap2"]]
-    dictionary = Dictionary.fit(first, spec=described.spec, size=5)
+    dictionary = Dictionary.fit(first, spec=described.spec, options=DictionaryOptions(size=5))
     names = np.unique(seen)
     votes = np.equal.outer(np.arange(25), dictionary.words(first)[0]).astype(int) @ np.equal.outer(seen, names)
     told = names[votes.argmax(axis=1)][dictionary.words(second)[0]]

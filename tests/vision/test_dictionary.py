@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from placerec.errors import OutputError, VisionError
 from placerec.frames.table import FrameTable
-from placerec.vision import Descriptors, DescriptorSpec, Dictionary, descriptor
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions, descriptor
 from placerec.vision.chunks import CHUNK, Source
 from placerec.vision.dictionary import Quality
 
@@ -31,9 +31,9 @@ def sample(n: int = 300, seed: int = 0) -> NDArray[np.float32]:
     return (places[rng.integers(20, size=n)] + 0.01 * rng.random((n, 384))).astype(np.float32)
 
 
-def fit(descriptors: Source | None = None, **options: Any) -> Dictionary:
-    chosen: Content = {"spec": SPEC, "size": 5} | options
-    return Dictionary.fit(sample() if descriptors is None else descriptors, **chosen)
+def fit(descriptors: Source | None = None, spec: DescriptorSpec = SPEC, **options: Any) -> Dictionary:
+    chosen = DictionaryOptions(**({"size": 5} | options))
+    return Dictionary.fit(sample() if descriptors is None else descriptors, spec=spec, options=chosen)
 
 
 @pytest.fixture(scope="module")
@@ -144,11 +144,11 @@ def test_streamed_descriptors_are_checked() -> None:
 
 BLAS = """
 import numpy as np
-from placerec.vision import DescriptorSpec, Dictionary
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions
 from placerec.vision.som import train_som
 rng = np.random.default_rng(0)
 rows = (rng.random((30, 384))[rng.integers(30, size=1500)] + 0.3 * rng.random((1500, 384))).astype(np.float32)
-made = Dictionary.fit(rows, spec=DescriptorSpec(), size=12, components=40, epochs=6)
+made = Dictionary.fit(rows, spec=DescriptorSpec(), options=DictionaryOptions(size=12, components=40, epochs=6))
 print(made.fingerprint, made.words(rows[:100] + np.float32(0.01))[1].tobytes().hex())
 online = train_som(rows[:300, :40], 12, rng=rng, rule="online", epochs=1)
 print(online.codebook.tobytes().hex())

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.frames import Sequence, find_sequences
-from placerec.vision import DescriptorSpec, Dictionary, describe, describe_sources, train_dictionary
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, describe_sources, train_dictionary
 from placerec.vision.external import read_rows
 
 FRAMES = [("b", "1.png"), ("b", "2.png"), ("a", "1.png")]
@@ -211,7 +211,12 @@ def test_a_matrix_without_any_row_of_these_frames(runs: list[Sequence], tmp_path
 
 def test_a_dictionary_of_a_matrix(runs: list[Sequence], tmp_path: Path) -> None:
     np.save(tmp_path / "m.npy", features())
-    made = train_dictionary([tmp_path / "runs"], tmp_path / "w.npz", matrix=tmp_path / "m.npy", size=2, components=3)
+    made = train_dictionary(
+        [tmp_path / "runs"],
+        tmp_path / "w.npz",
+        options=DictionaryOptions(size=2, components=3),
+        matrix=tmp_path / "m.npy",
+    )
     loaded = Dictionary.load(tmp_path / "w.npz")
     assert loaded.spec == DescriptorSpec(kind="npy", columns=5)
     np.testing.assert_array_equal(loaded.words(features())[0], made.words(features())[0])

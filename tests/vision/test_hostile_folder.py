@@ -175,10 +175,12 @@ def test_what_was_found_otherwise_is_not_taken_up(tmp_path: Path, monkeypatch: p
     if change == "version":
         monkeypatch.setattr("placerec.vision.work.__version__", "0.0.0")
     if change == "dictionary":
-        from placerec.vision import Dictionary
+        from placerec.vision import Dictionary, DictionaryOptions
         from placerec.words.tokenize import tokenize
 
-        Dictionary.fit(np.random.default_rng(0).random((30, 384), np.float32), spec=SPEC, size=2).save(tmp_path / "w")
+        Dictionary.fit(
+            np.random.default_rng(0).random((30, 384), np.float32), spec=SPEC, options=DictionaryOptions(size=2)
+        ).save(tmp_path / "w")
         tokenize(run, tmp_path / "w", out, work=workers(1))
     else:
         describe_sources(run, out, spec=spec, work=workers(1))

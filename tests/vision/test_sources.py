@@ -12,7 +12,7 @@ from helpers.small_world import write_images
 from placerec.cli import commands
 from placerec.errors import OutputError
 from placerec.frames import files_of, find_sequences
-from placerec.vision import DescriptorSpec, Dictionary, describe, describe_sources, train_dictionary
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, describe_sources, train_dictionary
 
 SPEC = DescriptorSpec(image_size=32)
 
@@ -26,13 +26,15 @@ def test_held_out_frames_train_nothing_and_are_measured(tmp_path: Path, caplog: 
             [tmp_path / "run1"],
             tmp_path / "words.npz",
             spec=SPEC,
-            size=5,
+            options=DictionaryOptions(size=5),
             held_out=[tmp_path / "run2"],
             progress=lambda done, total: told.append((done, total)),
         )
         summary = caplog.messages[-1]
     assert told == [(12, 20), (20, 20)]
-    without = train_dictionary([tmp_path / "run1"], tmp_path / "other.npz", spec=SPEC, size=5)
+    without = train_dictionary(
+        [tmp_path / "run1"], tmp_path / "other.npz", spec=SPEC, options=DictionaryOptions(size=5)
+    )
     assert made.fingerprint == without.fingerprint
     got = made.measure(describe(find_sequences([tmp_path / "run2"]), SPEC))
     assert got.frames == 8
@@ -61,8 +63,10 @@ def test_the_command_says_what_came_of_it(tmp_path: Path) -> None:
 
 def test_another_rule_is_another_map(tmp_path: Path) -> None:
     write_images(tmp_path / "run1", seed=1)
-    batch = train_dictionary([tmp_path / "run1"], tmp_path / "a.npz", spec=SPEC, size=3)
-    online = train_dictionary([tmp_path / "run1"], tmp_path / "b.npz", spec=SPEC, size=3, rule="online")
+    batch = train_dictionary([tmp_path / "run1"], tmp_path / "a.npz", spec=SPEC, options=DictionaryOptions(size=3))
+    online = train_dictionary(
+        [tmp_path / "run1"], tmp_path / "b.npz", spec=SPEC, options=DictionaryOptions(size=3, rule="online")
+    )
     np.testing.assert_array_equal(batch.pca.components, online.pca.components)
     assert batch.fingerprint != online.fingerprint
 

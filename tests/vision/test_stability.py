@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from placerec.errors import VisionError
 from placerec.frames import Sequence, find_sequences, read_gray
 from placerec.frames.sequence import Gray
-from placerec.vision import DescriptorSpec, Dictionary, describe, descriptor, fit_image, stability
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, descriptor, fit_image, stability
 from placerec.vision.stability import CHANGES, Change, Stability, word_changes
 
 SPEC = DescriptorSpec(image_size=16)
@@ -25,7 +25,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> World:
     for seed, name in enumerate(("seq1", "seq2")):
         write_images(root / name, seed, 10)
     sequences = find_sequences([root])
-    return sequences, Dictionary.fit(describe(sequences, SPEC).values, spec=SPEC, size=4)
+    return sequences, Dictionary.fit(describe(sequences, SPEC).values, spec=SPEC, options=DictionaryOptions(size=4))
 
 
 def change(kind: str, amount: str) -> Change:

@@ -10,7 +10,7 @@ from helpers.small_world import write_images
 
 from placerec.errors import OutputError, VisionError
 from placerec.frames import find_sequences
-from placerec.vision import DescriptorSpec, Dictionary, describe
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe
 from placerec.words import read_stream, read_vocabulary
 from placerec.words.tokenize import streams_of, tokenize, tokens_of
 
@@ -21,7 +21,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for seed, name in enumerate(("seq1", "seq2")):
         write_images(root / "runs" / name, seed)
     described = describe(find_sequences([root / "runs"]), DescriptorSpec(image_size=16))
-    Dictionary.fit(described.values, spec=described.spec, size=4).save(root / "words.npz")
+    Dictionary.fit(described.values, spec=described.spec, options=DictionaryOptions(size=4)).save(root / "words.npz")
     return root
 
 
@@ -98,7 +98,7 @@ def test_an_output_that_cannot_be_replaced_is_refused_before_any_image_is_read(
 def test_frames_of_a_matrix_become_words_and_no_image_is_read(world: Path, tmp_path: Path) -> None:
     rows = np.random.default_rng(0).normal(size=(24, 6)).astype(np.float32)
     np.save(tmp_path / "rows.npy", rows)
-    dictionary = Dictionary.fit(rows, spec=DescriptorSpec(kind="npy", columns=6), size=3)
+    dictionary = Dictionary.fit(rows, spec=DescriptorSpec(kind="npy", columns=6), options=DictionaryOptions(size=3))
     dictionary.save(tmp_path / "words.npz")
     write_images(tmp_path / "runs/seq1")
     write_images(tmp_path / "runs/seq2")

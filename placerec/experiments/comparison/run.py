@@ -22,8 +22,8 @@ from placerec.experiments.comparison.results import Comparison, format_methods, 
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
 from placerec.figures.canvas import check_figure
 from placerec.files import whole_folder, write_text
-from placerec.frames import Reading, find_sequences
 from placerec.frames import Sequence as FrameSequence
+from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.naming import own_name, unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
 from placerec.jobs import ProgressBar, silent
@@ -46,7 +46,7 @@ def compare(
     methods: Iterable[str] | None = None,
     size: int = SIZE,
     seed: int = 0,
-    reading: Reading = Reading(),
+    source_options: SourceOptions = SourceOptions(),
     cache: Path | str | None = None,
     progress: ProgressBar = silent,
 ) -> Comparison:
@@ -61,7 +61,7 @@ def compare(
     _check_installed(chosen)
     out = Path(out)
     check_figure(out / "methods.png")
-    training, tests = _split(train, test, reading)
+    training, tests = _split(train, test, source_options)
     cache = out / "cache" if cache is None else Path(cache)
     with held_output(out):
         encoded = []
@@ -104,18 +104,22 @@ def _check_installed(names: Iterable[str]) -> None:
 
 
 def _split(
-    train: Iterable[Path | str], test: Iterable[Path | str], reading: Reading
+    train: Iterable[Path | str], test: Iterable[Path | str], source_options: SourceOptions
 ) -> tuple[list[FrameSequence], list[FrameSequence]]:
     """The sequences to learn from and to test on, under names that are unique among both."""
-    testing = find_sequences(test, reading=reading)
+    testing = find_sequences(test, options=source_options)
     left_out = {sequence.source.resolve() for sequence in testing}
-    learning = [s for s in find_sequences(train, reading=reading) if s.source.resolve() not in left_out]
+    learning = [s for s in find_sequences(train, options=source_options) if s.source.resolve() not in left_out]
     if not learning:
         raise EvaluationError("every sequence is a test sequence, and none is left to learn from; name others")
     both = [*learning, *testing]
-    if reading.labels and reading.labels.is_file() and sum(sequence.recording is not None for sequence in both) > 1:
+    if (
+        source_options.labels
+        and source_options.labels.is_file()
+        and sum(sequence.recording is not None for sequence in both) > 1
+    ):
         what = "is one file, and training and test are several recordings"
-        raise SourceError(f"{reading.labels}: {what}; name a folder that holds NAME.labels for each")
+        raise SourceError(f"{source_options.labels}: {what}; name a folder that holds NAME.labels for each")
     names = unique_names([(own_name(s.source.resolve()), s.source) for s in both], SourceError)
     both = [replace(sequence, name=name) for sequence, name in zip(both, names, strict=True)]
     training, tests = both[: len(learning)], both[len(learning) :]
