@@ -24,7 +24,8 @@ from placerec.lm.inspection import format_inspection, inspect_model
 from placerec.model import Options, load_recognizer, read_corpus, train_model
 from placerec.vision import Dictionary, DictionaryOptions, describe
 from placerec.words import read_stream
-from placerec.words.tokenize import tokens_of, write_tokens
+from placerec.words.folder import write_tokens
+from placerec.words.tokenize import tokens_of
 
 SMOOTHINGS = ("witten-bell", "lidstone")
 ORDERS = (1, 2)

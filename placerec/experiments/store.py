@@ -29,7 +29,8 @@ from placerec.version import __version__
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions, describe
 from placerec.vision.storage import read_npz, write_npz
 from placerec.words import WordStream
-from placerec.words.tokenize import tokens_of, write_tokens
+from placerec.words.folder import VOCABULARY, write_tokens
+from placerec.words.tokenize import tokens_of
 
 FORMAT = "placerec experiments 3"
 # Frames that are described before their descriptors are written: enough to keep many processors at work.
@@ -196,7 +197,7 @@ class WordsJob:
         """Whether all that `make_tokens` writes is there."""
         names = [f"{one.sequence.name}.tsv" for one in (*self.train, *self.test)]
         folder = self.folder
-        return self.words.exists() and all((folder / name).exists() for name in (*names, "vocab.txt"))
+        return self.words.exists() and all((folder / name).exists() for name in (*names, VOCABULARY))
 
     def dictionary(self) -> Dictionary:
         """The dictionary, which is learned and kept if there is none yet."""

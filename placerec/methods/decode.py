@@ -25,10 +25,10 @@ from placerec.hohmm.explain import EXPLAINED
 from placerec.jobs import Progress
 from placerec.methods.decoders import HOHMM, make_decoder
 from placerec.model import Decoding, load_model
-from placerec.model.corpus import STREAM_SUFFIXES
 from placerec.model.decoding import PAPER
 from placerec.model.recognize import token_streams
 from placerec.words import WordStream
+from placerec.words.folder import is_stream
 
 OWNED = ("*.tsv", "*.jsonl")
 log = logging.getLogger(__name__)
@@ -63,7 +63,7 @@ def decode(
         from placerec.words.tokenize import streams_of
 
         for source in sources:
-            if str(source).endswith(STREAM_SUFFIXES):
+            if is_stream(Path(source)):
                 raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
         dictionary = Dictionary.load(words)
         decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)

@@ -21,8 +21,8 @@ from placerec.hohmm import Belief, SequenceDecoder, format_header
 from placerec.methods.decode import format_belief
 from placerec.methods.decoders import HOHMM, make_decoder
 from placerec.model import load_model
-from placerec.model.corpus import STREAM_SUFFIXES
 from placerec.model.decoding import PAPER, Decoding
+from placerec.words.folder import is_stream
 
 if TYPE_CHECKING:
     from placerec.vision import Dictionary
@@ -84,7 +84,7 @@ def decode_live(
 
     if options.looks_ahead or options.explain:
         raise ModelError("live decoding answers before later words are known: no smooth, viterbi, lag or explain")
-    if str(source).endswith(STREAM_SUFFIXES):
+    if is_stream(Path(source)):
         raise StreamError(f"{source}: is a token stream, and live decoding is of images; name a camera or a video")
     dictionary = Dictionary.load(words)
     decoder = make_decoder(method, load_model(model), options=options, scorer=scorer, dictionary=dictionary)

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from placerec.errors import ModelError
 from placerec.lm import BackoffModel
-from placerec.model.corpus import VOCABULARY
 from placerec.model.load import PlaceModels
 from placerec.model.record import read_record
 from placerec.model.train import MODEL_JSON, PlaceFiles
 from placerec.words import Sentences, read_sentences, read_vocabulary
+from placerec.words.folder import VOCABULARY
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,13 +13,13 @@ from placerec.files import held_folder, write_text
 from placerec.hohmm import Beliefs
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.unknown import measure_distances
-from placerec.model.corpus import TokenMaker, dictionary_of, stream_files
 from placerec.model.decoding import PAPER, Decoding, describe_decoding
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.recognize import make_recognizer, token_streams
 from placerec.model.record import read_distances
 from placerec.model.train import MODEL_JSON, format_description
 from placerec.words import WordStream
+from placerec.words.folder import TokenMaker, dictionary_of, stream_files
 
 log = logging.getLogger(__name__)
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 from placerec.errors import ModelError
 from placerec.hohmm import Emissions, Recognizer, SeparateEmissions
 from placerec.lm.external import kenlm_scorer
-from placerec.model.corpus import check_dictionary, read_streams, stream_files
 from placerec.model.decoding import PAPER, Decoding, check_online, transition_of
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.trust import calibration_of, unknown_model_of
 from placerec.words import WordStream
+from placerec.words.folder import check_dictionary, read_streams, stream_files
 
 if TYPE_CHECKING:
     from placerec.vision import Dictionary

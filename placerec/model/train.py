@@ -32,10 +32,11 @@ from placerec.lm import (
 from placerec.lm.count_sums import count_texts
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
-from placerec.model.corpus import VOCABULARY, gather_corpus
+from placerec.model.corpus import gather_corpus
 from placerec.model.record import NO_RECORD, Record, describe_record
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, each_sentence, format_sentences, write_vocabulary
+from placerec.words.folder import VOCABULARY
 
 FORMAT = "placerec model 1"
 MODEL_JSON = "model.json"

@@ -20,7 +20,7 @@ from placerec.lm.count_sums import read_counts, subtract_counts
 from placerec.lm.counts import add_counts
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.trie import Vocabulary
-from placerec.model.corpus import VOCABULARY, Corpus, check_dictionary, holds_sentences, read_corpus, stream_files
+from placerec.model.corpus import Corpus, holds_sentences, read_corpus
 from placerec.model.load import read_description
 from placerec.model.record import Record, add_record, read_record, take_away
 from placerec.model.train import (
@@ -34,6 +34,7 @@ from placerec.model.train import (
     write_place,
 )
 from placerec.words import format_sentences, parse_selection, read_vocabulary
+from placerec.words.folder import VOCABULARY, check_dictionary, stream_files
 from placerec.words.stream import stream_name
 
 # The sentences of a place, as in its file.

@@ -1,5 +1,6 @@
 """Words as text: token streams, selection, sentences."""
 
+from placerec.words.folder import read_vocabulary, write_vocabulary
 from placerec.words.selection import Selection, parse_selection, select, selector
 from placerec.words.sentences import (
     Sentences,
@@ -13,7 +14,7 @@ from placerec.words.sentences import (
     time_gaps,
     visits,
 )
-from placerec.words.stream import WordStream, read_stream, read_vocabulary, write_stream, write_vocabulary
+from placerec.words.stream import WordStream, read_stream, write_stream
 
 __all__ = [
     "Selection",

@@ -184,23 +184,15 @@ def _numbers(path: Path, lines: Iterable[int], title: str, texts: Sequence[str])
     return numbers
 
 
-def read_vocabulary(path: Path | str) -> tuple[str, ...]:
-    """The words of a vocab.txt, one a line, in its order; StreamError for an empty file or a word listed twice."""
-    lines = read_text(Path(path), StreamError).removeprefix("\ufeff").splitlines()
-    words: dict[str, int] = {}
-    for i, line in enumerate(lines, start=1):
-        if not line.strip():
-            continue
-        word = check_word(path, i, line.strip())
-        if word in words:
-            raise StreamError(at(path, i, f"the word {word!r} is listed already, on line {words[word]}"))
-        words[word] = i
-    if not words:
-        raise StreamError(f"{path}: holds no word; one word a line is expected")
-    return tuple(words)
-
-
-def write_vocabulary(words: Iterable[str], path: Path | str) -> None:
-    """Write a vocab.txt: one word a line; StreamError for a string in place of words."""
-    refuse_string(words, StreamError)
-    write_text(Path(path), "".join(f"{word}\n" for word in words))
+def locate(path: Path, column: str, value: str) -> str:
+    """`path:line` of the first `value` in a column of a token stream, or among the words of a plain text."""
+    lines = read_text(path, StreamError).removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
+    header = lines[0].split("\t")
+    for number, line in enumerate(lines, start=1):
+        if "word" not in header:
+            found = line.split()
+        else:
+            found = line.split("\t")[header.index(column) :][:1] if number > 1 else []
+        if value in found:
+            return f"{path}:{number}"
+    return str(path)

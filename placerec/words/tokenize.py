@@ -1,25 +1,23 @@
 """From images to token streams: the word of every frame."""
 
-import json
 import logging
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from placerec.files import encoded, whole_folder, write_text
+from placerec.files import whole_folder
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.batches import Batch
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal
-from placerec.version import __version__
 from placerec.vision import Descriptors, Dictionary, describe
 from placerec.vision.spec import check_describes_images
 from placerec.vision.work import Answer, Tally, answers, describe_batch
-from placerec.words.stream import HEADER, WordStream, format_rows, write_vocabulary
+from placerec.words.folder import OWNED, fill_folder
+from placerec.words.stream import WordStream
 
-OWNED = ("*.tsv", "vocab.txt", "tokens.json")
 log = logging.getLogger(__name__)
 
 
@@ -38,13 +36,13 @@ def tokenize(
     `words`: the words.npz to use. `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed
     elsewhere (`describe`). `work`: who does the work (`jobs.workers`), None for threads; the bytes are the same with
     any. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes on from
-    there. tokens.json names the dictionary's fingerprint and what it was learnt from, for who trains and calibrates.
+    there.
     """
     dictionary = Dictionary.load(Path(words))
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
     with whole_folder(Path(out), OWNED) as folder, open_journal(Path(out)) as journal:
         parts = _parts(sources, dictionary, matrix, source_options, work, journal, progress)
-        names, seen = _write(parts, dictionary, folder)
+        names, seen = fill_folder(parts, dictionary, folder)
     log.info("%s: %d sequences, %d of %d words seen", out, len(names), len(seen), len(dictionary.vocabulary))
 
 
@@ -76,12 +74,6 @@ def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStre
         words = tuple(vocabulary[unit] for unit in units[rows].tolist())
         streams.append(WordStream(name, descriptors.table.take(rows), words, distances[rows].astype(float)))
     return streams
-
-
-def write_tokens(streams: Iterable[WordStream], dictionary: Dictionary, out: Path) -> None:
-    """Write the tokens folder `out`, whole or not at all."""
-    with whole_folder(out, OWNED) as folder:
-        _write(streams, dictionary, folder)
 
 
 def tokenize_batch(dictionary: Dictionary, batch: Batch) -> Answer:
@@ -132,24 +124,3 @@ def _tokenized(
             table = FrameTable.of_frames(batch.sequence, frames)
             yield WordStream(batch.sequence, table, words, answer.arrays["distances"].astype(float))
     tally.close()
-
-
-def _write(parts: Iterable[WordStream], dictionary: Dictionary, folder: Path) -> tuple[set[str], set[str]]:
-    """The names of the sequences and the words that were written."""
-    names: set[str] = set()
-    seen: set[str] = set()
-    for part in parts:
-        path = folder / f"{part.name}.tsv"
-        with path.open("ab") as file:
-            file.write(encoded(path, format_rows(part) if part.name in names else HEADER + format_rows(part)))
-        names.add(part.name)
-        seen.update(part.words)
-    write_vocabulary(dictionary.vocabulary, folder / "vocab.txt")
-    description = {
-        "format": "placerec tokens 1",
-        "version": __version__,
-        "dictionary": dictionary.fingerprint,
-        "trained_on": list(dictionary.sequences),
-    }
-    write_text(folder / "tokens.json", json.dumps(description, indent=2) + "\n")
-    return names, seen

@@ -24,8 +24,8 @@ from placerec.lm import BackoffModel, NgramCounts, count_ngrams
 from placerec.lm.trie import Trie
 from placerec.lm.union import unite_models
 from placerec.model import Corpus, Options, estimate_place, read_corpus
-from placerec.model.corpus import read_streams
 from placerec.words import Selection, WordStream, parse_selection, place_steps
+from placerec.words.folder import read_streams
 
 
 class GridCell(NamedTuple):

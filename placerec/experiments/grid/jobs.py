@@ -17,8 +17,8 @@ from placerec.frames import find_sequences
 from placerec.frames.folder import natural_key
 from placerec.frames.recordings import is_recording
 from placerec.jobs import ProgressBar, map_jobs, workers
-from placerec.model.corpus import VOCABULARY, stream_files
 from placerec.vision import DescriptorSpec
+from placerec.words.folder import VOCABULARY, stream_files
 
 SPEC = DescriptorSpec()
 

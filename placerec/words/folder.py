@@ -1,0 +1,163 @@
+"""The tokens folder: NAME.tsv, the token stream of a sequence; vocab.txt, all words; tokens.json, what made them.
+
+tokens.json has the fingerprint of the `dictionary` and the sequences that it was `trained_on`, for those who train and
+calibrate. Another tokeniser writes none.
+"""
+
+import json
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from placerec.errors import StreamError, at, refuse_string
+from placerec.files import encoded, read_text, whole_folder, write_text
+from placerec.frames.naming import unique_names
+from placerec.version import __version__
+from placerec.words.stream import HEADER, WordStream, check_word, format_rows, read_stream, stream_name
+
+if TYPE_CHECKING:
+    from placerec.vision import Dictionary
+
+STREAM_SUFFIXES = (".tsv", ".tsv.gz")
+VOCABULARY, TOKENS_JSON = "vocab.txt", "tokens.json"
+OWNED = ("*.tsv", VOCABULARY, TOKENS_JSON)
+
+
+@dataclass(frozen=True)
+class TokenMaker:
+    """The dictionary that made token streams, the sequences that it was learnt from, and a folder that says so."""
+
+    folder: Path
+    fingerprint: str
+    trained_on: frozenset[str] = frozenset()
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a path is named as a token stream is."""
+    return path.name.endswith(STREAM_SUFFIXES)
+
+
+def stream_files(sources: Iterable[Path | str]) -> list[Path]:
+    """The token stream files that `sources` (files, or folders of .tsv files) name, in order; none of them twice."""
+    files: dict[str, Path] = {}
+    for source in map(Path, sources):
+        if not source.exists():
+            raise StreamError(f"{source}: no such file or folder; token streams (.tsv) are expected")
+        found = sorted(p for p in source.iterdir() if is_stream(p)) if source.is_dir() else [source]
+        if not found:
+            raise StreamError(f"{source}: holds no token stream (.tsv); `placerec tokenize` makes them of images")
+        for path in found:
+            if files.setdefault(os.path.abspath(path), path) is not path:
+                raise StreamError(f"{path}: is given twice; name each sequence once")
+    return list(files.values())
+
+
+def read_streams(sources: Iterable[Path | str]) -> list[WordStream]:
+    """The token streams that `sources` name, with names of their own (StreamError for two of one name)."""
+    return list(each_stream(stream_files(sources)))
+
+
+def each_stream(files: Sequence[Path]) -> Iterator[WordStream]:
+    """The token streams in files one after the other, with names of their own (StreamError for two of one name)."""
+    names = unique_names([(stream_name(path), path) for path in files], StreamError)
+    for name, path in zip(names, files, strict=True):
+        yield read_stream(path).renamed(name)
+
+
+def read_vocabulary(path: Path | str) -> tuple[str, ...]:
+    """The words of a vocab.txt, one a line, in its order; StreamError for an empty file or a word listed twice."""
+    lines = read_text(Path(path), StreamError).removeprefix("\ufeff").splitlines()
+    words: dict[str, int] = {}
+    for i, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        word = check_word(path, i, line.strip())
+        if word in words:
+            raise StreamError(at(path, i, f"the word {word!r} is listed already, on line {words[word]}"))
+        words[word] = i
+    if not words:
+        raise StreamError(f"{path}: holds no word; one word a line is expected")
+    return tuple(words)
+
+
+def write_vocabulary(words: Iterable[str], path: Path | str) -> None:
+    """Write a vocab.txt: one word a line; StreamError for a string in place of words."""
+    refuse_string(words, StreamError)
+    write_text(Path(path), "".join(f"{word}\n" for word in words))
+
+
+def find_vocabulary(folders: Iterable[Path]) -> Path:
+    """The vocab.txt in the first of `folders` that holds one; StreamError if none does."""
+    tried = list(dict.fromkeys(folder / VOCABULARY for folder in folders))
+    for path in tried:
+        if path.exists():
+            return path
+    raise StreamError(f"{tried[0]}: no such file; the vocabulary (all words, one a line) is named with --vocab FILE")
+
+
+def dictionary_of(files: Iterable[Path]) -> TokenMaker | None:
+    """The dictionary that made the token streams in `files`, None if it is not known.
+
+    Raises StreamError if there are two: the same word would mean different things.
+    """
+    makers = [maker for folder in dict.fromkeys(path.parent for path in files) if (maker := _maker(folder))]
+    for other in makers[1:]:
+        if other.fingerprint != makers[0].fingerprint:
+            raise StreamError(
+                f"{other.folder}: its words are of another dictionary than those of {makers[0].folder}; "
+                "tokenize both with one words.npz"
+            )
+    return makers[0] if makers else None
+
+
+def check_dictionary(files: Iterable[Path], trained_on: str | None, model: Path) -> None:
+    """Raise StreamError if the token streams in `files` are known to be in other words than those of `model`."""
+    made_by = dictionary_of(files)
+    if made_by and trained_on and made_by.fingerprint != trained_on:
+        raise StreamError(
+            f"{made_by.folder}: its words are of another dictionary than those that trained {model}; "
+            "tokenize with the words.npz of the training"
+        )
+
+
+def _maker(folder: Path) -> TokenMaker | None:
+    path = folder / TOKENS_JSON
+    if not path.exists():
+        return None
+    try:
+        found = json.loads(read_text(path, StreamError))
+        return TokenMaker(folder, str(found["dictionary"]), frozenset(map(str, found.get("trained_on", ()))))
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise StreamError(f"{path}: is no description of tokens; tokenize again") from error
+
+
+def write_tokens(streams: Iterable[WordStream], dictionary: "Dictionary", out: Path) -> None:
+    """Write the tokens folder `out`, whole or not at all."""
+    with whole_folder(out, OWNED) as folder:
+        fill_folder(streams, dictionary, folder)
+
+
+def fill_folder(parts: Iterable[WordStream], dictionary: "Dictionary", folder: Path) -> tuple[set[str], set[str]]:
+    """Write pieces of token streams, those of a sequence in order, and what goes with them.
+
+    Returns the names of the sequences and the words that were written.
+    """
+    names: set[str] = set()
+    seen: set[str] = set()
+    for part in parts:
+        path = folder / f"{part.name}.tsv"
+        with path.open("ab") as file:
+            file.write(encoded(path, format_rows(part) if part.name in names else HEADER + format_rows(part)))
+        names.add(part.name)
+        seen.update(part.words)
+    write_vocabulary(dictionary.vocabulary, folder / VOCABULARY)
+    description = {
+        "format": "placerec tokens 1",
+        "version": __version__,
+        "dictionary": dictionary.fingerprint,
+        "trained_on": list(dictionary.sequences),
+    }
+    write_text(folder / TOKENS_JSON, json.dumps(description, indent=2) + "\n")
+    return names, seen
