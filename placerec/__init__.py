@@ -28,7 +28,7 @@ _ROOMS = {
         "read_beliefs",
         "read_transitions",
     ),
-    "placerec.model": ("Decoding", "Options", "calibrate", "load_recognizer", "train_lm", "update"),
+    "placerec.model": ("Decoding", "ModelOptions", "calibrate", "load_recognizer", "train_lm", "update"),
     "placerec.methods": ("decode", "follow_live", "load_decoder"),
     "placerec.evaluation": ("evaluate",),
     "placerec.experiments.comparison": ("compare",),
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from placerec.lm.checks import check_model
     from placerec.lm.inspection import inspect_model
     from placerec.methods import decode, follow_live, load_decoder
-    from placerec.model import Decoding, Options, calibrate, load_recognizer, train_lm, update
+    from placerec.model import Decoding, ModelOptions, calibrate, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
@@ -77,7 +77,7 @@ __all__ = [
     "Dictionary",
     "DictionaryOptions",
     "Frame",
-    "Options",
+    "ModelOptions",
     "PlacerecError",
     "Recognizer",
     "Selection",

@@ -21,7 +21,7 @@ from placerec.inspection.words import WordTable, typical_images, word_sentences,
 from placerec.jobs import ProgressBar
 from placerec.lab import render_lab
 from placerec.lm.inspection import format_inspection, inspect_model
-from placerec.model import Options, load_recognizer, read_corpus, train_model
+from placerec.model import ModelOptions, load_recognizer, read_corpus, train_model
 from placerec.vision import Dictionary, DictionaryOptions, describe
 from placerec.words import read_stream
 from placerec.words.folder import write_tokens
@@ -87,7 +87,7 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
 def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
     """Train on runs 1 and 2, and decode run 3, of the tokens in `folder`."""
     files = sorted((folder / "tokens").glob("*.tsv"))
-    options = Options(order=order, smoothing=smoothing)
+    options = ModelOptions(order=order, smoothing=smoothing)
     corpus = read_corpus([path for path in files if not path.stem.endswith(TEST_RUN)], selection=options.select)
     model = folder / "models" / f"{smoothing}-{order}"
     train_model(

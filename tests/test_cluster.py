@@ -23,7 +23,7 @@ from placerec.cli import commands
 from placerec.cluster import check_address, cluster
 from placerec.errors import MissingExtraError, StreamError
 from placerec.jobs import JobError, Numbered, RemoteExecutor, ScatteredMap, scatter
-from placerec.model import Options, train_lm
+from placerec.model import ModelOptions, train_lm
 from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe_sources, train_dictionary
 from placerec.words.tokenize import tokenize
 
@@ -194,8 +194,8 @@ def test_tokenize(machines: LocalDask, images: Path, tmp_path: Path, monkeypatch
     assert contents(tmp_path / "here") == contents(tmp_path / "command")
 
 
-@pytest.mark.parametrize("options", [Options(order=3), Options(smoothing="lidstone", markers=True, min_count=(1, 2))])
-def test_train_lm(machines: LocalDask, tmp_path: Path, options: Options) -> None:
+@pytest.mark.parametrize("options", [ModelOptions(3), ModelOptions(2, "lidstone", markers=True, min_count=(1, 2))])
+def test_train_lm(machines: LocalDask, tmp_path: Path, options: ModelOptions) -> None:
     (tmp_path / "tokens").mkdir()
     tokens = write_tokens(tmp_path / "tokens", [f"run{number}" for number in range(12)])
     train_lm([tokens], tmp_path / "here", options=options)

@@ -8,7 +8,7 @@ import numpy as np
 from placerec.arrays import Floats
 from placerec.hohmm import filter_stream, fixed_transition
 from placerec.lm import count_ngrams
-from placerec.model.train import Options, estimate_place
+from placerec.model.train import ModelOptions, estimate_place
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions
 from placerec.words import Selection, Sentences, WordStream, sentences_per_place
 from placerec.words.tokenize import tokens_of
@@ -49,10 +49,10 @@ def trained(training: Descriptors, tests: Descriptors) -> Iterator[Trained]:
             streams, others = tokens_of(training, dictionary), tokens_of(tests, dictionary)
             sentences = sentences_per_place(streams, Selection())
             counts = [
-                count_ngrams(text, Options().order, vocabulary=dictionary.vocabulary, markers=False)
+                count_ngrams(text, ModelOptions().order, vocabulary=dictionary.vocabulary, markers=False)
                 for text in sentences.values()
             ]
-            models = [estimate_place(one, Options()) for one in counts]
+            models = [estimate_place(one, ModelOptions()) for one in counts]
             log10_p = [np.stack([model.score(stream.words) for model in models], axis=1) for stream in others]
             yield Trained(sentences, streams, others, log10_p, len(dictionary.vocabulary))
 

@@ -18,7 +18,7 @@ from single_frame import SEEDS, SIZE, arguments, described, fold_names
 from placerec.evaluation import Evaluation, evaluate
 from placerec.hohmm import Beliefs, Recognizer, Transition, fixed_transition, learned_transition
 from placerec.lm import count_ngrams
-from placerec.model.train import Options, estimate_place
+from placerec.model.train import ModelOptions, estimate_place
 from placerec.vision import Dictionary, DictionaryOptions
 from placerec.words import WordStream, parse_selection, place_steps, sentences_per_place
 from placerec.words.tokenize import tokens_of
@@ -29,9 +29,9 @@ HEAD = """\
 """
 SELECTIONS = ("none", "subsample:3", "subsample:5", "compress:3", "unique")
 MODELS = {
-    "none, n = 1": Options(1),
-    **{f"{name}, n = 2": Options(2, select=parse_selection(name)) for name in SELECTIONS},
-    "unique, n = 2, lidstone-backoff": Options(2, "lidstone-backoff", select=parse_selection("unique")),
+    "none, n = 1": ModelOptions(1),
+    **{f"{name}, n = 2": ModelOptions(2, select=parse_selection(name)) for name in SELECTIONS},
+    "unique, n = 2, lidstone-backoff": ModelOptions(2, "lidstone-backoff", select=parse_selection("unique")),
 }
 TRANSITIONS = ("fixed per update", "fixed per frame", "learned")
 # What later words add, where all words count and transitions are learned.

@@ -79,7 +79,7 @@ def train_lm(
 
     TOKENS are token streams (.tsv), folders of them, or one folder of sentences: PLACE.txt, one visit a line.
     """
-    from placerec.model import Options, parse_min_count
+    from placerec.model import ModelOptions, parse_min_count
     from placerec.model import train_lm as run
     from placerec.words import parse_selection
 
@@ -87,6 +87,6 @@ def train_lm(
         minima = parse_min_count(min_count)
     with usage("--select"):
         selection = parse_selection(select)
-    options = Options(order, smoothing, delta, minima, markers, selection)
+    options = ModelOptions(order, smoothing, delta, minima, markers, selection)
     with progress_bar("train-lm") as progress:
         run(tokens, out, options=options, vocabulary=vocab, work=work, progress=progress)

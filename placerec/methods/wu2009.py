@@ -15,12 +15,12 @@ from placerec.hohmm import Emissions
 from placerec.lm import BackoffModel, count_ngrams
 from placerec.lm.union import unite_models
 from placerec.methods.training_set import TrainingSet
-from placerec.model import Options, estimate_place
+from placerec.model import ModelOptions, estimate_place
 
 
 def fit(training: TrainingSet) -> Emissions:
     """Emissions of one word at a time."""
-    options = Options(1, "lidstone-backoff", training.delta)
+    options = ModelOptions(1, "lidstone-backoff", training.delta)
     texts = [[[training.vocabulary[i] for i in visit] for visit in visits] for visits in training.sentences]
     counted = [count_ngrams(text, 1, vocabulary=training.vocabulary) for text in texts]
     return unite_models([_as_in_arpa(estimate_place(counts, options)) for counts in counted])

@@ -5,13 +5,13 @@ from placerec.model.corpus import Corpus, read_corpus
 from placerec.model.decoding import Decoding, transition_of
 from placerec.model.load import PlaceModels, load_model
 from placerec.model.recognize import load_recognizer, make_recognizer
-from placerec.model.train import Options, estimate_place, parse_min_count, train_lm, train_model
+from placerec.model.train import ModelOptions, estimate_place, parse_min_count, train_lm, train_model
 from placerec.model.update import update
 
 __all__ = [
     "Corpus",
     "Decoding",
-    "Options",
+    "ModelOptions",
     "PlaceModels",
     "calibrate",
     "estimate_place",

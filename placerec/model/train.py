@@ -47,7 +47,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Options:
+class ModelOptions:
     """How language models are made; every name is that of the command line.
 
     `order`: n-gram order (1: the classical HMM). `delta`: see `placerec.lm.smoothing`; None for its default.
@@ -86,7 +86,7 @@ def parse_min_count(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in parts)
 
 
-def estimate_place(counts: NgramCounts, options: Options) -> BackoffModel:
+def estimate_place(counts: NgramCounts, options: ModelOptions) -> BackoffModel:
     """The language model of one place: V = all words of the counts' vocabulary."""
     non_events = () if options.markers else (SENTENCE_END,)
     rule = smoothing(options.smoothing, options.delta)
@@ -98,7 +98,7 @@ def train_lm(
     tokens: Sequence[Path | str],
     out: Path | str,
     *,
-    options: Options = Options(),
+    options: ModelOptions = ModelOptions(),
     vocabulary: Path | str | None = None,
     work: Executor | None = None,
     progress: Progress | None = None,
@@ -129,7 +129,7 @@ def train_model(
     vocabulary: Sequence[str],
     out: Path | str,
     *,
-    options: Options = Options(),
+    options: ModelOptions = ModelOptions(),
     record: Record = NO_RECORD,
     work: Executor | None = None,
     progress: Progress | None = None,
@@ -151,7 +151,7 @@ def _write_model(
     folder: Path,
     sentences: Mapping[str, Iterable[Sequence[str]]],
     vocabulary: Sequence[str],
-    options: Options,
+    options: ModelOptions,
     record: Record,
     work: Executor | None,
     progress: Progress | None,
@@ -167,7 +167,7 @@ def _write_model(
 
 
 def _counted(
-    texts: Iterable[Iterable[Sequence[str]]], vocabulary: Sequence[str], options: Options, work: Executor | None
+    texts: Iterable[Iterable[Sequence[str]]], vocabulary: Sequence[str], options: ModelOptions, work: Executor | None
 ) -> Iterator[NgramCounts]:
     order, markers = options.order, options.markers
     if work is not None:
@@ -175,7 +175,7 @@ def _counted(
     return (count_ngrams(text, order, vocabulary=vocabulary, markers=markers) for text in texts)
 
 
-def begin_model(folder: Path, vocabulary: Sequence[str], options: Options) -> None:
+def begin_model(folder: Path, vocabulary: Sequence[str], options: ModelOptions) -> None:
     """Write into a new MODEL/ folder what does not depend on the places."""
     (folder / "sentences").mkdir(exist_ok=True)
     (folder / "counts").mkdir()
@@ -184,7 +184,9 @@ def begin_model(folder: Path, vocabulary: Sequence[str], options: Options) -> No
         write_text(folder / "nonevents.txt", SENTENCE_END + "\n")
 
 
-def write_place(folder: Path, place: str, counts: NgramCounts, vocabulary: Sequence[str], options: Options) -> None:
+def write_place(
+    folder: Path, place: str, counts: NgramCounts, vocabulary: Sequence[str], options: ModelOptions
+) -> None:
     """Write into MODEL/, beside the sentences of one place, their counts, and the model of these."""
     files = PlaceFiles.of(folder, place)
     if not files.sentences.stat().st_size:
@@ -197,7 +199,7 @@ def write_place(folder: Path, place: str, counts: NgramCounts, vocabulary: Seque
     write_arpa(model, files.arpa, comment=signature(place, len(vocabulary), options))
 
 
-def signature(place: str, words: int, options: Options) -> str:
+def signature(place: str, words: int, options: ModelOptions) -> str:
     """What made a model, in one line: the first line of its ARPA file."""
     delta = f" delta={_delta(options):g}" if options.smoothing.startswith(("lidstone", "absolute")) else ""
     return (
@@ -207,7 +209,7 @@ def signature(place: str, words: int, options: Options) -> str:
     )
 
 
-def ngram_count_command(place: str, options: Options) -> str | None:
+def ngram_count_command(place: str, options: ModelOptions) -> str | None:
     """The SRILM command that makes the same model of the same sentences, run in MODEL/; None where there is none."""
     method = SRILM_OPTIONS[options.smoothing]
     if method is None:
@@ -225,12 +227,12 @@ def ngram_count_command(place: str, options: Options) -> str | None:
     )
 
 
-def _delta(options: Options) -> float:
+def _delta(options: ModelOptions) -> float:
     return default_delta(options.smoothing) if options.delta is None else options.delta
 
 
 def write_model_json(
-    folder: Path, places: Sequence[str], vocabulary: Sequence[str], options: Options, record: Record
+    folder: Path, places: Sequence[str], vocabulary: Sequence[str], options: ModelOptions, record: Record
 ) -> None:
     """Write the model.json of a model that is not calibrated."""
     description = {
@@ -267,7 +269,7 @@ def _format(value: Any, indent: str) -> str:
     return f"{opening}\n" + ",\n".join(f"{indent}  {text}" for text in texts) + f"\n{indent}{closing}"
 
 
-def check_options(options: Options) -> None:
+def check_options(options: ModelOptions) -> None:
     """ModelError or LanguageModelError for an option that no model can be made with."""
     if not 1 <= options.order <= MAX_ORDER:
         raise ModelError(f"order {options.order} is not between 1 and {MAX_ORDER}")
@@ -276,7 +278,7 @@ def check_options(options: Options) -> None:
     smoothing(options.smoothing, options.delta)
 
 
-def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: Options) -> None:
+def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: ModelOptions) -> None:
     check_options(options)
     if not sentences:
         raise ModelError(NO_PLACE)

@@ -26,7 +26,7 @@ from placerec.model.record import Record, add_record, read_record, take_away
 from placerec.model.train import (
     MODEL_JSON,
     OWNED,
-    Options,
+    ModelOptions,
     PlaceFiles,
     begin_model,
     check_options,
@@ -47,7 +47,7 @@ class _Model:
     """A MODEL/ folder as far as learning goes on from it."""
 
     path: Path
-    options: Options
+    options: ModelOptions
     vocabulary: Sequence[str] = field(repr=False)
     record: Record = field(repr=False)
     calibrated: bool
@@ -110,7 +110,7 @@ def _read_model(path: Path) -> _Model:
     keys = ("order", "smoothing", "delta", "min_count", "markers", "select")
     try:
         order, method, delta, min_count, markers, select = (description[key] for key in keys)
-        options = Options(order, method, delta, tuple(min_count), markers, parse_selection(select))
+        options = ModelOptions(order, method, delta, tuple(min_count), markers, parse_selection(select))
         check_options(options)
     except (KeyError, TypeError) as error:
         raise ModelError(f"{path / MODEL_JSON}: its options make no model; train the model again") from error

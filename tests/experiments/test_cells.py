@@ -15,7 +15,7 @@ from placerec.experiments.grid.run import run_grid
 from placerec.figures import evaluate_files
 from placerec.hohmm import Beliefs, read_beliefs
 from placerec.methods import decode
-from placerec.model import Decoding, Options, train_lm
+from placerec.model import Decoding, ModelOptions, train_lm
 from placerec.words import WordStream, parse_selection
 
 TRANSITIONS = {"fixed": Decoding(stay=0.9, per="frame"), "learned": Decoding(transition="learned")}
@@ -38,7 +38,7 @@ def test_rows_are_those_of_the_commands(tmp_path: Path) -> None:
     assert len(results.rows) == 2 * 2 * 3 * 2
     tokens = [tmp_path / "tokens" / f"run{i}.tsv" for i in (1, 2, 3)]
     for row in results.rows:
-        options = Options(order=row.order, smoothing=row.smoothing, select=parse_selection(row.select))
+        options = ModelOptions(order=row.order, smoothing=row.smoothing, select=parse_selection(row.select))
         train_lm(tokens[:2], tmp_path / "model", options=options)
         decode(tokens[2:], tmp_path / "model", out=tmp_path / "beliefs", options=TRANSITIONS[row.transition])
         found = evaluate_files([tmp_path / "beliefs"])
@@ -63,7 +63,7 @@ def test_beliefs_are_those_of_decode_to_the_last_digit(tmp_path: Path) -> None:
     tokens = tuple(tmp_path / "tokens" / f"run{i}.tsv" for i in (1, 2, 3))
     for cell in (GridCell("witten-bell", 3, "fixed"), GridCell("lidstone-backoff", 2, "learned")):
         job = CellJob(tokens[:2], tokens[2:], "compress:2", (cell,), 0.9, "frame", tmp_path / "kept.json")
-        options = Options(order=cell.order, smoothing=cell.smoothing, select=parse_selection("compress:2"))
+        options = ModelOptions(order=cell.order, smoothing=cell.smoothing, select=parse_selection("compress:2"))
         train_lm(tokens[:2], tmp_path / "model", options=options)
         (wanted,) = decode(tokens[2:], tmp_path / "model", options=TRANSITIONS[cell.transition])
         (found,) = believe_cell(job, cell)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from placerec.lm import count_ngrams
 from placerec.methods import MakeStepper, TrainingSet, make_training_set
-from placerec.model import Options, estimate_place
+from placerec.model import ModelOptions, estimate_place
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,7 +26,7 @@ def training_set_of(
     text = {f"p{c}": [[f"w{w}" for w in visit] for visit in visits] for c, visits in enumerate(sentences)}
     vocabulary = [f"w{w}" for w in range(words)]
     models = {
-        place: estimate_place(count_ngrams(visits, order, vocabulary=vocabulary), Options(order))
+        place: estimate_place(count_ngrams(visits, order, vocabulary=vocabulary), ModelOptions(order))
         for place, visits in text.items()
     }
     return make_training_set(text, vocabulary, steps=steps, triples=triples, models=models)

@@ -12,7 +12,7 @@ from helpers.small_world import PLACES, write_tokens
 from placerec.errors import ModelError, OutputError, StreamError
 from placerec.hohmm import format_beliefs, read_beliefs
 from placerec.methods import decode, decode_lines
-from placerec.model import Options, load_recognizer, train_lm
+from placerec.model import ModelOptions, load_recognizer, train_lm
 from placerec.words import Selection, parse_selection, read_stream
 
 
@@ -25,7 +25,7 @@ def world(tmp_path: Path) -> Path:
 
 
 def test_selection_is_applied_at_test_too(world: Path) -> None:
-    train_lm([world / "tokens"], world / "model", options=Options(select=Selection("subsample", 3)))
+    train_lm([world / "tokens"], world / "model", options=ModelOptions(select=Selection("subsample", 3)))
     (beliefs,) = decode([world / "tokens/run3.tsv"], world / "model")
     assert beliefs.selected.tolist() == [i % 3 == 0 for i in range(60)]
     assert (beliefs.belief[1] == beliefs.belief[0]).all()
@@ -105,7 +105,7 @@ def lines_of(world: Path, text: str, *, as_json: bool = False) -> list[str]:
 
 @pytest.mark.parametrize("rule", ["none", "subsample:3", "compress:2", "unique"])
 def test_a_stream_is_answered_as_the_file_is(world: Path, rule: str) -> None:
-    options = Options(3, select=parse_selection(rule))
+    options = ModelOptions(3, select=parse_selection(rule))
     train_lm([world / "tokens/run1.tsv", world / "tokens/run2.tsv"], world / "model", options=options)
     stream = read_stream(world / "tokens/run3.tsv")
     text = "".join(f"{word}\t{time}\n" for word, time in zip(stream.words, stream.times, strict=True))

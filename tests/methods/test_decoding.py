@@ -14,7 +14,7 @@ from helpers.small_world import PLACES, write_tokens
 from placerec.errors import ModelError, StreamError
 from placerec.hohmm import fixed_transition, learned_transition
 from placerec.methods import decode, decode_lines, load_decoder
-from placerec.model import Decoding, Options, load_model, load_recognizer, train_lm, transition_of
+from placerec.model import Decoding, ModelOptions, load_model, load_recognizer, train_lm, transition_of
 from placerec.words import parse_selection, read_stream
 
 
@@ -22,7 +22,7 @@ from placerec.words import parse_selection, read_stream
 def world(tmp_path: Path) -> Path:
     """Tokens of three runs, and a model of the first two."""
     write_tokens(tmp_path / "tokens")
-    options = Options(select=parse_selection("unique"))
+    options = ModelOptions(select=parse_selection("unique"))
     train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model", options=options)
     return tmp_path
 

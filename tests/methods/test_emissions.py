@@ -17,7 +17,7 @@ from placerec.arrays import Floats
 from placerec.hohmm import Emissions
 from placerec.methods import TrainingSet, decode, dubois2011, mtd, wu2009
 from placerec.methods.tables import count_pairs
-from placerec.model import Options, train_lm
+from placerec.model import ModelOptions, train_lm
 
 FITS: tuple[Callable[[TrainingSet], Emissions], ...] = (wu2009.fit, dubois2011.fit, mtd.fit)
 # What an ARPA file keeps of a logarithm.
@@ -67,7 +67,7 @@ def test_wu2009_is_order_1_to_the_byte(extra: tuple[str, ...], delta: float | No
 
     tokens = write_tokens(tmp_path / "tokens")
     runs = [tokens / "run1.tsv", tokens / "run2.tsv"]
-    train_lm(runs, tmp_path / "model", options=Options(1, "lidstone-backoff", delta))
+    train_lm(runs, tmp_path / "model", options=ModelOptions(1, "lidstone-backoff", delta))
     args = ["decode", str(tokens), "-m", str(tmp_path / "model"), *extra]
     for out, method in (("a", ()), ("b", ("--method", "wu2009"))):
         result = CliRunner().invoke(commands, [*args, *method, "-o", str(tmp_path / out)])
@@ -79,8 +79,8 @@ def test_wu2009_is_order_1_to_the_byte(extra: tuple[str, ...], delta: float | No
 def test_wu2009_does_not_depend_on_the_models(tmp_path: Path) -> None:
     tokens = write_tokens(tmp_path / "tokens")
     runs = [tokens / "run1.tsv", tokens / "run2.tsv"]
-    train_lm(runs, tmp_path / "one", options=Options(1, "lidstone-backoff"))
-    train_lm(runs, tmp_path / "two", options=Options(2, "witten-bell"))
+    train_lm(runs, tmp_path / "one", options=ModelOptions(1, "lidstone-backoff"))
+    train_lm(runs, tmp_path / "two", options=ModelOptions(2, "witten-bell"))
     [expected] = decode([tokens / "run3.tsv"], tmp_path / "one")
     [found] = decode([tokens / "run3.tsv"], tmp_path / "two", method="wu2009")
     np.testing.assert_array_equal(found.belief, expected.belief)

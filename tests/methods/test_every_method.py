@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from placerec.cli.decode import METHODS as NAMED
 from placerec.methods import METHODS, MakeStepper, TrainingSet, decode, load_decoder, make_training_set
-from placerec.model import Options, train_lm
+from placerec.model import ModelOptions, train_lm
 from placerec.words import Selection, read_stream
 
 FITS = {name: method.fit for name, method in METHODS.items() if method.fit}
@@ -90,7 +90,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("world")
     tokens = write_tokens(root / "tokens")
     for select in ("none", "unique"):
-        options = Options(select=Selection(select))
+        options = ModelOptions(select=Selection(select))
         train_lm([tokens / "run1.tsv", tokens / "run2.tsv"], root / select, options=options)
     return root
 

@@ -9,7 +9,7 @@ from helpers.training_sets import training_set_of
 
 from placerec.errors import ModelError
 from placerec.methods import make_training_set, read_training_set
-from placerec.model import Options, load_model, train_lm
+from placerec.model import ModelOptions, load_model, train_lm
 from placerec.words import place_steps, place_triples
 
 
@@ -40,7 +40,7 @@ def test_a_lesson_is_what_was_trained_on(tokens: Path, tmp_path: Path) -> None:
 def test_the_delta_is_the_models_where_it_adds_one(
     smoothing: str, delta: float | None, expected: float, tokens: Path, tmp_path: Path
 ) -> None:
-    train_lm([tokens], tmp_path / "model", options=Options(2, smoothing, delta))
+    train_lm([tokens], tmp_path / "model", options=ModelOptions(2, smoothing, delta))
     assert read_training_set(load_model(tmp_path / "model")).delta == expected
 
 

@@ -8,7 +8,7 @@ import pytest
 from helpers.small_world import PLACES, VOCABULARY, write_tokens
 
 from placerec.errors import SourceError, StreamError
-from placerec.model import Options, read_corpus, train_lm
+from placerec.model import ModelOptions, read_corpus, train_lm
 from placerec.words import Selection, parse_selection
 
 
@@ -146,4 +146,4 @@ def test_streams_without_labels_cannot_train(tmp_path: Path) -> None:
     write(tmp_path / "run.tsv", "word\na\n")
     write(tmp_path / "vocab.txt", "a\n")
     with pytest.raises(Exception, match="no labelled frame found: label the frames"):
-        train_lm([tmp_path / "run.tsv"], tmp_path / "model", options=Options())
+        train_lm([tmp_path / "run.tsv"], tmp_path / "model", options=ModelOptions())

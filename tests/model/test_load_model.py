@@ -10,7 +10,7 @@ import pytest
 from helpers.small_world import PLACES, VOCABULARY, write_tokens
 
 from placerec.errors import LanguageModelError, ModelError, PlacerecError
-from placerec.model import Decoding, Options, load_model, load_recognizer, train_lm
+from placerec.model import Decoding, ModelOptions, load_model, load_recognizer, train_lm
 from placerec.words import Selection
 
 
@@ -28,7 +28,7 @@ def refused(message: str, model: Path, error: type[PlacerecError] = ModelError) 
 
 
 def test_a_model_is_read_back(world: Path) -> None:
-    train_lm([world / "tokens"], world / "model", options=Options(3, select=Selection("compress", 2)))
+    train_lm([world / "tokens"], world / "model", options=ModelOptions(3, select=Selection("compress", 2)))
     model = load_model(world / "model")
     assert list(model.models) == list(PLACES)
     assert {one.order for one in model.models.values()} == {3}

@@ -16,7 +16,7 @@ from helpers.small_world import PLACES, VOCABULARY, run_through
 from placerec.errors import LanguageModelError, ModelError, OutputError, SourceError
 from placerec.lm import SMOOTHINGS, count_ngrams, format_counts, read_arpa
 from placerec.lm.external import kenlm_scorer
-from placerec.model import Options, estimate_place, parse_min_count, train_model
+from placerec.model import ModelOptions, estimate_place, parse_min_count, train_model
 from placerec.model.record import LearnedSequence, Record
 from placerec.model.train import ngram_count_command
 from placerec.version import __version__
@@ -69,7 +69,7 @@ def test_sentences_and_counts_are_what_was_counted(tmp_path: Path) -> None:
 
 
 def test_the_first_line_says_what_made_the_model(tmp_path: Path) -> None:
-    options = Options(3, "lidstone", 0.5, (1, 1, 2), True, Selection("subsample", 3))
+    options = ModelOptions(3, "lidstone", 0.5, (1, 1, 2), True, Selection("subsample", 3))
     train_model(KITCHEN, ("a", "b"), tmp_path, options=options)
     first = (tmp_path / "kitchen.arpa").read_text().splitlines()[0]
     assert first == (
@@ -86,7 +86,7 @@ def test_a_model_without_delta_does_not_name_one(tmp_path: Path) -> None:
 
 
 def test_model_json_tells_all_options(tmp_path: Path) -> None:
-    options = Options(3, "lidstone-backoff", 0.5, (1, 2), False, Selection("unique"))
+    options = ModelOptions(3, "lidstone-backoff", 0.5, (1, 2), False, Selection("unique"))
     sequences = (LearnedSequence("run2", {"kitchen": 2}), LearnedSequence("run1", {"kitchen": 0}))
     record = Record(sequences, "f00", np.array([[7]]), {"kitchen": {-3: 8, 2: 1}}, np.zeros((1, 1, 1), np.int64))
     train_model(KITCHEN, ("a", "b"), tmp_path, options=options, record=record)
@@ -116,26 +116,29 @@ def test_model_json_tells_all_options(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "command"),
     [
-        (Options(), "-nonevents nonevents.txt -no-sos -no-eos -order 2 -gt1min 1 -gt2min 1 -wbdiscount -interpolate"),
-        (Options(1, "witten-bell-backoff", markers=True), "-order 1 -gt1min 1 -wbdiscount"),
         (
-            Options(4, "witten-bell-backoff", min_count=parse_min_count("srilm"), markers=True),
+            ModelOptions(),
+            "-nonevents nonevents.txt -no-sos -no-eos -order 2 -gt1min 1 -gt2min 1 -wbdiscount -interpolate",
+        ),
+        (ModelOptions(1, "witten-bell-backoff", markers=True), "-order 1 -gt1min 1 -wbdiscount"),
+        (
+            ModelOptions(4, "witten-bell-backoff", min_count=parse_min_count("srilm"), markers=True),
             "-order 4 -gt1min 1 -gt2min 1 -gt3min 2 -gt4min 2 -wbdiscount",
         ),
     ],
 )
-def test_the_srilm_command_of_a_model(options: Options, command: str) -> None:
+def test_the_srilm_command_of_a_model(options: ModelOptions, command: str) -> None:
     expected = f"ngram-count -text sentences/hall.txt -vocab vocab.txt {command} -lm hall.arpa"
     assert ngram_count_command("hall", options) == expected
 
 
 def test_srilm_has_no_interpolated_lidstone() -> None:
-    assert ngram_count_command("hall", Options(smoothing="lidstone")) is None
+    assert ngram_count_command("hall", ModelOptions(smoothing="lidstone")) is None
 
 
 def test_nothing_of_a_former_model_remains(tmp_path: Path) -> None:
     train_model(SENTENCES, VOCABULARY, tmp_path / "model")
-    options = Options(markers=True)
+    options = ModelOptions(markers=True)
     train_model({"hall": SENTENCES["hall"]}, VOCABULARY, tmp_path / "model", options=options)
     expected = ["counts/hall.counts", "hall.arpa", "model.json", "sentences/hall.txt", "vocab.txt"]
     assert layout(tmp_path / "model") == expected
@@ -144,7 +147,7 @@ def test_nothing_of_a_former_model_remains(tmp_path: Path) -> None:
 
 def test_the_same_input_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("one", "two"):
-        train_model(SENTENCES, VOCABULARY, tmp_path / name, options=Options(4))
+        train_model(SENTENCES, VOCABULARY, tmp_path / name, options=ModelOptions(4))
     assert layout(tmp_path / "one") == layout(tmp_path / "two")
     for name in layout(tmp_path / "one"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
@@ -163,8 +166,8 @@ def test_a_failure_leaves_the_old_model(tmp_path: Path) -> None:
 def test_minimum_counts_drop_rare_ngrams(tmp_path: Path) -> None:
     text: Sentences = [["a", "b", "c"], ["a", "b", "c"], ["b", "c", "a"]]
     counts = count_ngrams(text, 3, vocabulary=("a", "b", "c"), markers=False)
-    model = estimate_place(counts, Options(3, min_count=parse_min_count("srilm")))
-    all_kept = estimate_place(counts, Options(3))
+    model = estimate_place(counts, ModelOptions(3, min_count=parse_min_count("srilm")))
+    all_kept = estimate_place(counts, ModelOptions(3))
     assert [len(p) for p in model.log10_ps] == [6, 3, 1]
     assert [len(p) for p in all_kept.log10_ps] == [6, 3, 2]
 
@@ -180,27 +183,37 @@ def test_the_minimum_counts_of_srilm() -> None:
 @pytest.mark.parametrize(
     ("sentences", "options", "error", "message"),
     [
-        ({}, Options(), ModelError, "no labelled frame found: label the frames"),
-        (KITCHEN, Options(order=0), ModelError, "order 0 is not between 1 and 9"),
-        (KITCHEN, Options(order=10), ModelError, "order 10 is not between 1 and 9"),
-        (KITCHEN, Options(min_count=()), ModelError, r"minimum counts \(\) are not understood"),
-        (KITCHEN, Options(min_count=(1, 0)), ModelError, r"minimum counts \(1, 0\) are not understood"),
-        (KITCHEN, Options(smoothing="good"), LanguageModelError, "smoothing 'good' is unknown; choose one of witten-b"),
-        (KITCHEN, Options(smoothing="lidstone", delta=0), LanguageModelError, "delta 0 must be a number above 0"),
-        ({"a/b": []}, Options(), ModelError, "place 'a/b' holds a /; rename it"),
-        ({".x": []}, Options(), ModelError, r"place '\.x' starts with a dot; rename it"),
-        ({"best": []}, Options(), ModelError, "place 'best' is the name of a column in placerec's files; rename it"),
-        ({"hall": [], "Hall": []}, Options(), SourceError, "place 'Hall' differs only in case from 'hall'"),
+        ({}, ModelOptions(), ModelError, "no labelled frame found: label the frames"),
+        (KITCHEN, ModelOptions(order=0), ModelError, "order 0 is not between 1 and 9"),
+        (KITCHEN, ModelOptions(order=10), ModelError, "order 10 is not between 1 and 9"),
+        (KITCHEN, ModelOptions(min_count=()), ModelError, r"minimum counts \(\) are not understood"),
+        (KITCHEN, ModelOptions(min_count=(1, 0)), ModelError, r"minimum counts \(1, 0\) are not understood"),
+        (
+            KITCHEN,
+            ModelOptions(smoothing="good"),
+            LanguageModelError,
+            "smoothing 'good' is unknown; choose one of witten-b",
+        ),
+        (KITCHEN, ModelOptions(smoothing="lidstone", delta=0), LanguageModelError, "delta 0 must be a number above 0"),
+        ({"a/b": []}, ModelOptions(), ModelError, "place 'a/b' holds a /; rename it"),
+        ({".x": []}, ModelOptions(), ModelError, r"place '\.x' starts with a dot; rename it"),
+        (
+            {"best": []},
+            ModelOptions(),
+            ModelError,
+            "place 'best' is the name of a column in placerec's files; rename it",
+        ),
+        ({"hall": [], "Hall": []}, ModelOptions(), SourceError, "place 'Hall' differs only in case from 'hall'"),
         (
             {"hall": [["a"], ["b", "z"]]},
-            Options(),
+            ModelOptions(),
             ModelError,
             "place hall, visit 2: the word 'z' is not in the vocabulary",
         ),
     ],
 )
 def test_what_cannot_be_trained_is_refused(
-    tmp_path: Path, sentences: dict[str, Sentences], options: Options, error: type[Exception], message: str
+    tmp_path: Path, sentences: dict[str, Sentences], options: ModelOptions, error: type[Exception], message: str
 ) -> None:
     with pytest.raises(error, match=message):
         train_model(sentences, ("a", "b"), tmp_path / "model", options=options)
@@ -209,7 +222,7 @@ def test_what_cannot_be_trained_is_refused(
 
 @pytest.mark.parametrize("name", SAFE)
 def test_a_place_without_words_is_uniform(tmp_path: Path, name: str, caplog: pytest.LogCaptureFixture) -> None:
-    train_model({"attic": [], **KITCHEN}, ("a", "b", "c", "d"), tmp_path, options=Options(3, name))
+    train_model({"attic": [], **KITCHEN}, ("a", "b", "c", "d"), tmp_path, options=ModelOptions(3, name))
     assert "place attic: no visit holds a selected word; its model is uniform" in caplog.text
     attic = read_arpa(tmp_path / "attic.arpa")
     # Seven digits are in the file.
@@ -224,7 +237,7 @@ def test_after_every_history_all_words_are_possible_and_sum_to_1(tmp_path: Path,
     """Without markers a model is closed: the K words share all the probability, after any history whatever."""
     vocabulary = ("a", "b", "c", "d")
     text: Sentences = [list("abacab"), list("bbb"), list("ca")]
-    train_model({"hall": text}, vocabulary, tmp_path, options=Options(order, name, 0.3))
+    train_model({"hall": text}, vocabulary, tmp_path, options=ModelOptions(order, name, 0.3))
     model = read_arpa(tmp_path / "hall.arpa")
     histories = [h for n in range(order) for h in itertools.product(vocabulary, repeat=n)]
     assert len(histories) == sum(4**n for n in range(order))
@@ -237,7 +250,7 @@ def test_after_every_history_all_words_are_possible_and_sum_to_1(tmp_path: Path,
 @pytest.mark.parametrize("name", SAFE)
 def test_with_markers_the_end_of_a_visit_is_one_more_event(tmp_path: Path, name: str) -> None:
     vocabulary = ("a", "b", "c", "d")
-    train_model({"hall": [list("abac"), list("b")]}, vocabulary, tmp_path, options=Options(2, name, markers=True))
+    train_model({"hall": [list("abac"), list("b")]}, vocabulary, tmp_path, options=ModelOptions(2, name, markers=True))
     model = read_arpa(tmp_path / "hall.arpa")
     assert model.log10_p("</s>", ["b"]) > -1
     for history in ([], ["a"], ["d"], ["<s>"]):
@@ -250,7 +263,7 @@ def test_with_markers_the_end_of_a_visit_is_one_more_event(tmp_path: Path, name:
 @pytest.mark.parametrize("name", SAFE)
 def test_kenlm_reads_every_model_in_silence_and_agrees(tmp_path: Path, name: str, order: int) -> None:
     pytest.importorskip("kenlm")
-    train_model(SENTENCES, VOCABULARY, tmp_path, options=Options(order, name, 0.5))
+    train_model(SENTENCES, VOCABULARY, tmp_path, options=ModelOptions(order, name, 0.5))
     stream = [*run_through("test", 7).words, *np.random.default_rng(0).choice(VOCABULARY, 100).tolist()]
     for place in PLACES:
         path = tmp_path / f"{place}.arpa"

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from placerec.errors import LanguageModelError, ModelError, OutputError, PlacerecError, SourceError, StreamError
 from placerec.files import held_folder
 from placerec.lm import SMOOTHINGS
-from placerec.model import Options, train_lm, update
+from placerec.model import ModelOptions, train_lm, update
 from placerec.words import WordStream, parse_selection, write_stream, write_vocabulary
 
 # Kneser-Ney cannot be fitted to few words.
@@ -29,7 +29,7 @@ FRAMES = st.tuples(
     st.sampled_from([np.nan, 0.0, 0.5, 0.6, 3.0]),
 )
 OPTIONS = st.builds(
-    Options,
+    ModelOptions,
     order=st.integers(1, 4),
     smoothing=st.sampled_from(SAFE),
     min_count=st.sampled_from([(1,), (1, 1, 2)]),
@@ -48,7 +48,7 @@ def write_run(path: Path, frames: Sequence[tuple[str, str, float, float]]) -> Pa
     return path
 
 
-def trained(runs: Sequence[Path], out: Path, options: Options) -> dict[str, str]:
+def trained(runs: Sequence[Path], out: Path, options: ModelOptions) -> dict[str, str]:
     train_lm(runs, out, options=options, vocabulary=runs[0].parent / "vocab.txt")
     return contents(out)
 
@@ -59,7 +59,7 @@ def trained(runs: Sequence[Path], out: Path, options: Options) -> dict[str, str]
     OPTIONS,
 )
 def test_learning_and_forgetting_equal_training_on_what_is_left(
-    parts: list[tuple[list[tuple[str, str, float, float]], bool]], options: Options
+    parts: list[tuple[list[tuple[str, str, float, float]], bool]], options: ModelOptions
 ) -> None:
     """With every order, smoothing, selection and marker, and for any sequences among the others."""
     assume(all(any(frame[0] for run, later in parts if later is which for frame in run) for which in (False, True)))
@@ -93,7 +93,7 @@ def write_long_runs(folder: Path) -> list[Path]:
 
 @pytest.mark.parametrize("smoothing", [name for name in SMOOTHINGS if name not in SAFE])
 def test_smoothings_that_are_fitted_are_fitted_to_all_counts(tmp_path: Path, smoothing: str) -> None:
-    runs, options = write_long_runs(tmp_path / "tokens"), Options(2, smoothing)
+    runs, options = write_long_runs(tmp_path / "tokens"), ModelOptions(2, smoothing)
     before, after = trained(runs[:2], tmp_path / "model", options), trained(runs, tmp_path / "all", options)
     update(tmp_path / "model", runs[2:])
     assert contents(tmp_path / "model") == after
@@ -102,7 +102,7 @@ def test_smoothings_that_are_fitted_are_fitted_to_all_counts(tmp_path: Path, smo
 
 
 def test_what_cannot_be_estimated_leaves_the_model(tmp_path: Path) -> None:
-    before = trained(write_long_runs(tmp_path / "tokens"), tmp_path / "model", Options(2, "kneser-ney"))
+    before = trained(write_long_runs(tmp_path / "tokens"), tmp_path / "model", ModelOptions(2, "kneser-ney"))
     with pytest.raises(LanguageModelError, match="place attic: Kneser-Ney fails"):
         update(tmp_path / "model", [write_run(tmp_path / "poor.tsv", [("attic", "w000", 1, 1)])])
     assert contents(tmp_path / "model") == before
@@ -157,7 +157,7 @@ def test_a_place_with_visits_but_no_selected_word_stays(tmp_path: Path) -> None:
     write_vocabulary(["a", "b"], tmp_path / "vocab.txt")
     one = write_run(tmp_path / "one.tsv", [("K", "a", 1, 1), ("L", "a", 1, 1)])
     two = write_run(tmp_path / "two.tsv", [("L", "b", 1, 1)])
-    options = Options(select=parse_selection("unique"))
+    options = ModelOptions(select=parse_selection("unique"))
     before = trained([one], tmp_path / "model", options)
     assert before["sentences/L.txt"] == ""
     update(tmp_path / "model", [two])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from placerec.lm import SMOOTHINGS
-from placerec.model import Options, train_model
+from placerec.model import ModelOptions, train_model
 from placerec.model.train import ngram_count_command
 from placerec.srilm.ngram_count import ngram_count
 from placerec.srilm.streams import Streams
@@ -26,7 +26,7 @@ def visits() -> list[list[str]]:
 def test_the_command_makes_the_same_lines(
     name: str, order: int, markers: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    options = Options(order=order, smoothing=name, markers=markers, min_count=(1, 1, 2))
+    options = ModelOptions(order=order, smoothing=name, markers=markers, min_count=(1, 1, 2))
     train_model({"hall": visits()}, [f"w{i:02d}" for i in range(60)], tmp_path / "model", options=options)
     command = ngram_count_command("hall", options)
     if command is None:

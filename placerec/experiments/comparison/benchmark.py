@@ -19,7 +19,7 @@ from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder
 from placerec.lm.union import unite_models
 from placerec.methods import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
 from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
-from placerec.model import Decoding, Options, PlaceModels, load_model, train_model, transition_of
+from placerec.model import Decoding, ModelOptions, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
 from placerec.words import Selection, place_steps, sentences_per_place
 
@@ -99,7 +99,7 @@ def train_models(encoded: EncodedSequences, training: int, cache: Path) -> Place
         sentences = [sentences_per_place([stream], Selection()) for stream in streams]
         record = record_streams(zip(streams, sentences, strict=True), dictionary.fingerprint)
         together = sentences_per_place(streams, Selection())
-        train_model(together, dictionary.vocabulary, path, options=Options(), record=record)
+        train_model(together, dictionary.vocabulary, path, options=ModelOptions(), record=record)
     return load_model(path)
 
 

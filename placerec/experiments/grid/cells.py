@@ -23,7 +23,7 @@ from placerec.hohmm.offline import believe
 from placerec.lm import BackoffModel, NgramCounts, count_ngrams
 from placerec.lm.trie import Trie
 from placerec.lm.union import unite_models
-from placerec.model import Corpus, Options, estimate_place, read_corpus
+from placerec.model import Corpus, ModelOptions, estimate_place, read_corpus
 from placerec.words import Selection, WordStream, parse_selection, place_steps
 from placerec.words.folder import read_streams
 
@@ -120,7 +120,7 @@ def _counts(corpus: Corpus, order: int) -> list[NgramCounts]:
 
 
 def _models(counts: Sequence[NgramCounts], smoothing: str, order: int) -> Emissions:
-    options = Options(order=order, smoothing=smoothing)
+    options = ModelOptions(order=order, smoothing=smoothing)
     return unite_models([_printed(estimate_place(up_to(one, order), options)) for one in counts])
 
 
