@@ -86,28 +86,28 @@ def judge(results: Results, transition: str) -> list[Claim]:
     if len(found.sequences) < LEAST:
         number = len(found.sequences)
         reason = f"{number} test sequence{'s' * (number != 1)}; a verdict needs {LEAST} or more"
-    return [Claim(name, text, _stated(statements, found, reason)) for name, text, statements in CLAIMS]
-
-
-def _stated(statements: Callable[[Scores], list["ClaimTerm"]], found: Scores, reason: str) -> list[Statement]:
-    stated = []
-    for term in statements(found):
-        try:
-            values = term.values() if len(found.sequences) > 1 else term.values()[:1]
-            stated.append(Statement(term.text, values, term.side, term.threshold, reason))
-        except MissingCellsError as error:
-            stated.append(Statement(term.text, None, term.side, term.threshold, str(error)))
-    return stated
+    stated = [(term.claim, _stated(term, found, reason)) for term in TERMS]
+    return [Claim(name, text, [one for of, one in stated if of == name]) for name, text in CLAIMS.items()]
 
 
 @dataclass(frozen=True)
 class ClaimTerm:
-    """A statement whose values are still to be asked of the grid."""
+    """A statement of a claim, before it is asked of a grid; `text` may name the {small} and the {large} map."""
 
+    claim: str
     text: str
-    values: Callable[[], Floats]
+    values: Callable[[Scores], Floats]
     side: str = "above"
     threshold: float = 0.0
+
+
+def _stated(term: ClaimTerm, s: Scores, reason: str) -> Statement:
+    text, values = term.text.format(small=s.size[0], large=s.size[-1]), None
+    try:
+        values = term.values(s) if len(s.sequences) > 1 else term.values(s)[:1]
+    except MissingCellsError as error:
+        reason = str(error)
+    return Statement(text, values, term.side, term.threshold, reason)
 
 
 def _at_20(s: Scores, family: Sequence[str], select: str) -> Floats:
@@ -157,146 +157,96 @@ def _spread(s: Scores, select: str) -> Floats:
     return apart
 
 
-def _o1(s: Scores) -> list[ClaimTerm]:
-    def values() -> Floats:
-        if len(s.size) < 2:
-            raise MissingCellsError("the grid has one size only")
-        return mean(s.take(size=[s.size[-1]]) - s.take(size=[s.size[0]]))
-
-    return [ClaimTerm(f"S = {s.size[-1]} minus S = {s.size[0]}, mean over all cells", values)]
+def _of_large_map(s: Scores) -> Floats:
+    if len(s.size) < 2:
+        raise MissingCellsError("the grid has one size only")
+    return mean(s.take(size=[s.size[-1]]) - s.take(size=[s.size[0]]))
 
 
-def _o2(s: Scores) -> list[ClaimTerm]:
-    def values() -> Floats:
-        return mean(_gain(s, _others(s, NONE)))
-
-    text = "selection minus none, mean over selections and all cells"
-    return [ClaimTerm(text, values), ClaimTerm(f"{text}: several percent", values, "above", SEVERAL)]
+def _of_selection(s: Scores) -> Floats:
+    return mean(_gain(s, _others(s, NONE)))
 
 
-def _o3(s: Scores) -> list[ClaimTerm]:
-    return [
-        ClaimTerm("s = 3 minus none, mean over all cells", lambda: mean(_gain(s, [THREE]))),
-        ClaimTerm(
-            "s = 3 minus none, in the cell where it gains most", lambda: _highest(_gain(s, [THREE])), "above", 6.0
-        ),
-    ]
+def _best_with_five(s: Scores) -> Floats:
+    own, others = _highest(_at_20(s, WITTEN_BELL, FIVE)), s.accuracy.copy()
+    others[s.size.index(20), s.smoothing.index(_one_of(s, WITTEN_BELL)), s.select.index(FIVE)] = 0
+    return own - _highest(others)
 
 
-def _o4(s: Scores) -> list[ClaimTerm]:
-    def best() -> Floats:
-        own, others = _highest(_at_20(s, WITTEN_BELL, FIVE)), s.accuracy.copy()
-        there = s.size.index(20), s.smoothing.index(_one_of(s, WITTEN_BELL)), s.select.index(FIVE)
-        others[there] = 0
-        return own - _highest(others)
-
-    return [
-        ClaimTerm("s = 5 minus s = 3, mean over all cells", lambda: mean(_gain(s, [FIVE], over=THREE)), "below"),
-        ClaimTerm(
-            "S = 20, Lidstone: s = 5 minus none, mean over n",
-            lambda: mean(_at_20(s, LIDSTONE, FIVE) - _at_20(s, LIDSTONE, NONE)),
-            "below",
-        ),
-        ClaimTerm("S = 20, Witten-Bell: the best n with s = 5 minus the best of all other cells", best),
-    ]
+def _of_compress(s: Scores) -> Floats:
+    gain = _gain(s, [COMPRESS])
+    kept = np.array([[not (size == 20 and name in WITTEN_BELL) for name in s.smoothing] for size in s.size], bool)
+    if not kept.any():
+        raise MissingCellsError("the grid has nothing but S = 20 with Witten-Bell")
+    average: Floats = gain[kept].mean(axis=(0, 1, 2))
+    return average
 
 
-def _o5(s: Scores) -> list[ClaimTerm]:
-    def elsewhere() -> Floats:
-        gain = _gain(s, [COMPRESS])
-        pairs = [(size, name) for size in s.size for name in s.smoothing]
-        kept = np.array([not (size == 20 and name in WITTEN_BELL) for size, name in pairs], bool)
-        if not kept.any():
-            raise MissingCellsError("the grid has nothing but S = 20 with Witten-Bell")
-        average: Floats = gain[kept.reshape(gain.shape[:2])].mean(axis=(0, 1, 2))
-        return average
-
-    return [
-        ClaimTerm("compress minus none, mean over all cells but S = 20 with Witten-Bell", elsewhere),
-        ClaimTerm(
-            "S = 20, Witten-Bell: compress minus none, mean over n",
-            lambda: mean(_at_20(s, WITTEN_BELL, COMPRESS) - _at_20(s, WITTEN_BELL, NONE)),
-            "below",
-            AMONG,
-        ),
-    ]
+def _behind_with_unique(s: Scores) -> Floats:
+    best = s.take(select=_others(s, UNIQUE)).max(axis=2, keepdims=True)
+    return -_highest(best - s.take(select=[UNIQUE]))
 
 
-def _o6(s: Scores) -> list[ClaimTerm]:
-    def gap() -> Floats:
-        others = _others(s, UNIQUE)
-        best = s.take(select=others).max(axis=2, keepdims=True)
-        behind = s.take(select=[UNIQUE]) - best
-        return -_highest(-behind)
-
-    def spread() -> Floats:
-        own = _spread(s, UNIQUE)
-        others = [_spread(s, name) for name in _others(s, UNIQUE)]
-        if not others:
-            raise MissingCellsError("the grid has no other selection")
-        least: Floats = np.min(others, axis=0)
-        return own - least
-
-    return [
-        ClaimTerm("unique minus the best other strategy, in the cell where it is worst", gap, "above", -AMONG),
-        ClaimTerm("spread over n >= 2 with unique minus the smallest of the other strategies", spread, "below"),
-    ]
+def _spread_with_unique(s: Scores) -> Floats:
+    own = _spread(s, UNIQUE)
+    others = [_spread(s, name) for name in _others(s, UNIQUE)]
+    if not others:
+        raise MissingCellsError("the grid has no other selection")
+    least: Floats = np.min(others, axis=0)
+    return own - least
 
 
-def _o7(s: Scores) -> list[ClaimTerm]:
-    return [
-        ClaimTerm(
-            "what selection gains over none, more for each step of n", lambda: _slope(s, _gain(s, _others(s, NONE)))
-        )
-    ]
+def _of_witten_bell(s: Scores) -> Floats:
+    return s.take(smoothing=[_one_of(s, WITTEN_BELL)]) - s.take(smoothing=[_one_of(s, LIDSTONE)])
 
 
-def _o8(s: Scores) -> list[ClaimTerm]:
-    def difference() -> Floats:
-        one, other = (_one_of(s, family) for family in (WITTEN_BELL, LIDSTONE))
-        return s.take(smoothing=[one]) - s.take(smoothing=[other])
-
-    return [
-        ClaimTerm("Witten-Bell minus Lidstone, mean over all cells", lambda: mean(difference())),
-        ClaimTerm("Witten-Bell minus Lidstone, more for each step of n", lambda: _slope(s, difference())),
-    ]
-
-
-def _o9(s: Scores) -> list[ClaimTerm]:
-    return [ClaimTerm("n = 2 minus n = 1, mean over all cells", lambda: mean(s.take(order=[2]) - s.take(order=[1])))]
-
-
-def _o10(s: Scores) -> list[ClaimTerm]:
+def _of_long_contexts(s: Scores, select: Sequence[str] | None = None) -> Floats:
     above = [n for n in s.order if n > 2]
-
-    def change(select: Sequence[str] | None) -> Floats:
-        return mean(s.take(order=above, select=select) - s.take(order=[2], select=select))
-
-    return [
-        ClaimTerm("n > 2 minus n = 2, mean over all cells", lambda: change(None), "within", LITTLE),
-        ClaimTerm(
-            "without selection: n > 2 minus n = 2, mean over sizes and smoothings", lambda: change([NONE]), "below"
-        ),
-    ]
+    return mean(s.take(order=above, select=select) - s.take(order=[2], select=select))
 
 
-def _o11(s: Scores) -> list[ClaimTerm]:
-    return [
-        ClaimTerm("frames right in the best cell, percent", lambda: _highest(s.accuracy), "above", HIGH),
-        ClaimTerm("the best cell minus always the most frequent place", lambda: _highest(s.accuracy) - s.majority),
-    ]
-
-
-CLAIMS: tuple[tuple[str, str, Callable[[Scores], list[ClaimTerm]]], ...] = (
-    ("O1", "A larger map gives better results.", _o1),
-    ("O2", "Word selection generally increases the results by several percent.", _o2),
-    ("O3", "Subsample with s = 3 is efficient, sometimes by 6 %.", _o3),
-    ("O4", "s = 5 gains less; with S = 20 it loses with Lidstone and is best of all with Witten-Bell.", _o4),
-    ("O5", "Compress is usually efficient, except with S = 20 and Witten-Bell.", _o5),
-    ("O6", "Unique is always among the best, and least sensitive to n.", _o6),
-    ("O7", "The effect of selection grows with n.", _o7),
-    ("O8", "Witten-Bell is slightly better than Lidstone, mainly for large n.", _o8),
-    ("O9", "n = 2 is a clear improvement over n = 1.", _o9),
-    ("O10", "n > 2 has little effect; without selection results drop.", _o10),
-    ("O11", "Recognition rates are already quite high.", _o11),
+CLAIMS = {
+    "O1": "A larger map gives better results.",
+    "O2": "Word selection generally increases the results by several percent.",
+    "O3": "Subsample with s = 3 is efficient, sometimes by 6 %.",
+    "O4": "s = 5 gains less; with S = 20 it loses with Lidstone and is best of all with Witten-Bell.",
+    "O5": "Compress is usually efficient, except with S = 20 and Witten-Bell.",
+    "O6": "Unique is always among the best, and least sensitive to n.",
+    "O7": "The effect of selection grows with n.",
+    "O8": "Witten-Bell is slightly better than Lidstone, mainly for large n.",
+    "O9": "n = 2 is a clear improvement over n = 1.",
+    "O10": "n > 2 has little effect; without selection results drop.",
+    "O11": "Recognition rates are already quite high.",
+}
+_SELECTION = "selection minus none, mean over selections and all cells"
+# fmt: off
+TERMS = (
+    ClaimTerm("O1", "S = {large} minus S = {small}, mean over all cells", _of_large_map),
+    ClaimTerm("O2", _SELECTION, _of_selection),
+    ClaimTerm("O2", f"{_SELECTION}: several percent", _of_selection, "above", SEVERAL),
+    ClaimTerm("O3", "s = 3 minus none, mean over all cells", lambda s: mean(_gain(s, [THREE]))),
+    ClaimTerm("O3", "s = 3 minus none, in the cell where it gains most",
+              lambda s: _highest(_gain(s, [THREE])), "above", 6.0),
+    ClaimTerm("O4", "s = 5 minus s = 3, mean over all cells", lambda s: mean(_gain(s, [FIVE], over=THREE)), "below"),
+    ClaimTerm("O4", "S = 20, Lidstone: s = 5 minus none, mean over n",
+              lambda s: mean(_at_20(s, LIDSTONE, FIVE) - _at_20(s, LIDSTONE, NONE)), "below"),
+    ClaimTerm("O4", "S = 20, Witten-Bell: the best n with s = 5 minus the best of all other cells", _best_with_five),
+    ClaimTerm("O5", "compress minus none, mean over all cells but S = 20 with Witten-Bell", _of_compress),
+    ClaimTerm("O5", "S = 20, Witten-Bell: compress minus none, mean over n",
+              lambda s: mean(_at_20(s, WITTEN_BELL, COMPRESS) - _at_20(s, WITTEN_BELL, NONE)), "below", AMONG),
+    ClaimTerm("O6", "unique minus the best other strategy, in the cell where it is worst",
+              _behind_with_unique, "above", -AMONG),
+    ClaimTerm("O6", "spread over n >= 2 with unique minus the smallest of the other strategies",
+              _spread_with_unique, "below"),
+    ClaimTerm("O7", "what selection gains over none, more for each step of n",
+              lambda s: _slope(s, _gain(s, _others(s, NONE)))),
+    ClaimTerm("O8", "Witten-Bell minus Lidstone, mean over all cells", lambda s: mean(_of_witten_bell(s))),
+    ClaimTerm("O8", "Witten-Bell minus Lidstone, more for each step of n", lambda s: _slope(s, _of_witten_bell(s))),
+    ClaimTerm("O9", "n = 2 minus n = 1, mean over all cells", lambda s: mean(s.take(order=[2]) - s.take(order=[1]))),
+    ClaimTerm("O10", "n > 2 minus n = 2, mean over all cells", _of_long_contexts, "within", LITTLE),
+    ClaimTerm("O10", "without selection: n > 2 minus n = 2, mean over sizes and smoothings",
+              lambda s: _of_long_contexts(s, [NONE]), "below"),
+    ClaimTerm("O11", "frames right in the best cell, percent", lambda s: _highest(s.accuracy), "above", HIGH),
+    ClaimTerm("O11", "the best cell minus always the most frequent place", lambda s: _highest(s.accuracy) - s.majority),
 )
+# fmt: on
