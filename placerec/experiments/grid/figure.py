@@ -1,4 +1,7 @@
-"""The paper's figure: a panel per map size and smoothing, bars of accuracy by n for each selection."""
+"""The pictures of an experiment: the paper's figure, beliefs of two sequences, a confusion matrix.
+
+The paper's figure is a panel per map size and smoothing, with bars of accuracy by n for each selection.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,10 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from placerec.evaluation import Evaluation
 from placerec.experiments.grid.config import Config
-from placerec.experiments.grid.results import Row, Setting, by_seed, setting_of
-from placerec.figures import figure_file
+from placerec.experiments.grid.results import Row, Setting, by_seed
+from placerec.figures import belief_strip, confusion_panel, figure_file, legend_panel
 from placerec.figures.canvas import place_colours
+from placerec.figures.panels import strip_title
+from placerec.hohmm import Beliefs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,7 +80,32 @@ def _bars(axes: "Axes", rows: Sequence[Row], plan: Config, accuracy: Mapping[Set
 
 
 def _lines(axes: "Axes", rows: Sequence[Row], baselines: Mapping[str, Mapping[Setting, Sequence[float]]]) -> None:
-    settings = {setting_of(row) for row in rows}
+    settings = {row.setting for row in rows}
     for kind, label, style in _BASELINES:
         height = 100 * float(np.mean([np.mean(baselines[kind][setting]) for setting in sorted(settings)]))
         axes.axhline(height, linestyle=style, color="black", linewidth=1.1, label=label)
+
+
+def draw_strips(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Path, width: float) -> None:
+    """Draw the beliefs of the sequences with the most and the fewest frames right; `width` in inches."""
+    scores = evaluation.sequences
+    judged = [one for one in beliefs if scores[one.name].accuracy is not None]
+    order = sorted(judged, key=lambda one: scores[one.name].accuracy or 0.0)
+    shown = list({one.name: one for one in (order[-1], order[0])}.values())
+    with figure_file(path, width, 0.9 + 2.0 * len(shown)) as figure:
+        figure.set_layout_engine("constrained")
+        *strips, legend = figure.subplots(
+            len(shown) + 1, 1, height_ratios=[1.0] * len(shown) + [0.12 * (2 + len(evaluation.places) // 2)]
+        )
+        for axes, one in zip(strips, shown, strict=True):
+            title = strip_title(one.name, scores[one.name].accuracy)
+            belief_strip(axes, one, places=evaluation.places, title=title)
+        legend_panel(legend, evaluation.places)
+
+
+def draw_confusion(evaluation: Evaluation, path: Path) -> None:
+    """Draw the confusion matrix of an evaluation."""
+    side = 2.0 + 0.5 * len(evaluation.places)
+    with figure_file(path, side + 1.0, side) as figure:
+        figure.set_layout_engine("constrained")
+        confusion_panel(figure.subplots(), evaluation)

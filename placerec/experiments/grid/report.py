@@ -14,7 +14,7 @@ from placerec.evaluation import Evaluation, evaluate
 from placerec.experiments.grid.cells import GridCell, believe_cell
 from placerec.experiments.grid.claims import judge
 from placerec.experiments.grid.config import Config
-from placerec.experiments.grid.figure import draw_figure
+from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
 from placerec.experiments.grid.jobs import GridJob
 from placerec.experiments.grid.results import Results, Setting
 from placerec.experiments.grid.tables import (
@@ -31,18 +31,13 @@ from placerec.experiments.grid.tables import (
 )
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.figures import (
-    belief_strip,
-    confusion_panel,
-    figure_file,
     heading,
     html_page,
-    legend_panel,
     paragraph,
     picture,
     preformatted,
     table,
 )
-from placerec.figures.panels import strip_title
 from placerec.files import content_digest_of_file, read_text, write_text
 from placerec.hohmm import Beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
@@ -144,7 +139,7 @@ def _table(content: Table, caption: str) -> str:
 
 
 @dataclass(frozen=True)
-class _Look:
+class _CloserLook:
     """A setting with seed 0, its beliefs over the test sequences of all folds, and their evaluation."""
 
     setting: Setting
@@ -157,60 +152,36 @@ def _of(jobs: Sequence[GridJob], setting: Setting) -> list[GridJob]:
     return [job for job in jobs if (job.size, job.seed, job.work.select) == (setting.size, 0, setting.select)]
 
 
-def _look(jobs: Sequence[GridJob], setting: Setting) -> _Look:
+def _look_at(jobs: Sequence[GridJob], setting: Setting) -> _CloserLook:
     cell = GridCell(setting.smoothing, setting.order, setting.transition)
     beliefs = [one for job in _of(jobs, setting) for one in believe_cell(job.work, cell)]
-    return _Look(setting, beliefs, evaluate(beliefs))
+    return _CloserLook(setting, beliefs, evaluate(beliefs))
 
 
 def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
     """Belief strips and confusion matrices of the best setting, and its words."""
-    best = _look(jobs, ranked(results)[0])
+    best = _look_at(jobs, ranked(results)[0])
     first = best.setting._replace(order=min(row.order for row in results.rows))
-    looks = [best] if first == best.setting else [best, _look(jobs, first)]
+    looks = [best] if first == best.setting else [best, _look_at(jobs, first)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         yield heading("Belief over time")
         caption = f"The sequences with the most and the fewest frames right: {best.setting}, seed 0."
-        strips = _strips(best, folder / "strips.png", 11)
-        narrow = _strips(best, folder / "narrow.png", 5)
+        strips, narrow = folder / "strips.png", folder / "narrow.png"
+        draw_strips(best.beliefs, best.evaluation, strips, 11)
+        draw_strips(best.beliefs, best.evaluation, narrow, 5)
         yield picture(strips, "Beliefs of two test sequences", caption, narrow=narrow)
         yield heading("What is confused")
         for number, look in enumerate(looks):
             path = folder / f"confusion{number}.png"
-            yield picture(_confusion(look, path), "Confusion matrix", f"{look.setting}, seed 0, all folds.")
+            draw_confusion(look.evaluation, path)
+            yield picture(path, "Confusion matrix", f"{look.setting}, seed 0, all folds.")
         images = _of(jobs, best.setting)[0].images
         if images is not None:
             yield heading("The words")
             _draw_words(images, folder / "words.png")
             caption = f"The words of S = {best.setting.size}, seed 0, among the test frames of the first fold."
             yield picture(folder / "words.png", "For each word a typical frame", caption)
-
-
-def _strips(look: _Look, path: Path, width: float) -> Path:
-    """The best and the worst sequence; `width` in inches."""
-    scores = look.evaluation.sequences
-    judged = [one for one in look.beliefs if scores[one.name].accuracy is not None]
-    order = sorted(judged, key=lambda one: scores[one.name].accuracy or 0.0)
-    shown = list({one.name: one for one in (order[-1], order[0])}.values())
-    with figure_file(path, width, 0.9 + 2.0 * len(shown)) as figure:
-        figure.set_layout_engine("constrained")
-        *strips, legend = figure.subplots(
-            len(shown) + 1, 1, height_ratios=[1.0] * len(shown) + [0.12 * (2 + len(look.evaluation.places) // 2)]
-        )
-        for axes, one in zip(strips, shown, strict=True):
-            title = strip_title(one.name, scores[one.name].accuracy)
-            belief_strip(axes, one, places=look.evaluation.places, title=title)
-        legend_panel(legend, look.evaluation.places)
-    return path
-
-
-def _confusion(look: _Look, path: Path) -> Path:
-    side = 2.0 + 0.5 * len(look.evaluation.places)
-    with figure_file(path, side + 1.0, side) as figure:
-        figure.set_layout_engine("constrained")
-        confusion_panel(figure.subplots(), look.evaluation)
-    return path
 
 
 def _draw_words(job: WordsJob, path: Path) -> None:

@@ -66,6 +66,11 @@ class Row:
     sequences: Mapping[str, SequenceCount] = field(repr=False)
 
     @property
+    def setting(self) -> "Setting":
+        """What the row is a result of, but for the seed and the fold."""
+        return Setting(self.size, self.smoothing, self.select, self.order, self.transition)
+
+    @property
     def frame_wise_accuracy(self) -> float:
         """The share of frames that their own word alone gets right (naive Bayes, order 1 without filter)."""
         return sum(one.frame_wise for one in self.sequences.values()) / self.frames
@@ -82,11 +87,6 @@ class Setting(NamedTuple):
 
     def __str__(self) -> str:
         return f"S = {self.size}, {self.smoothing}, {self.select}, n = {self.order}, {self.transition} transitions"
-
-
-def setting_of(row: Row) -> Setting:
-    """The setting of a row."""
-    return Setting(row.size, row.smoothing, row.select, row.order, row.transition)
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def by_seed(
     """Per setting, the share of the frames of all folds that are right, from 0 to 1: one number a seed."""
     counts: dict[Setting, dict[int, list[int]]] = {}
     for row in rows:
-        total = counts.setdefault(setting_of(row), {}).setdefault(row.seed, [0, 0])
+        total = counts.setdefault(row.setting, {}).setdefault(row.seed, [0, 0])
         total[0] += sum(map(share, row.sequences.values()))
         total[1] += row.frames
     return {setting: [right / frames for right, frames in seeds.values()] for setting, seeds in counts.items()}
@@ -141,6 +141,9 @@ def _csv(header: str, rows: Iterable[Sequence[object]]) -> str:
     return text.getvalue()
 
 
+AXES = ("size", "smoothing", "select", "order")
+
+
 class MissingCellsError(Exception):
     """The grid lacks what is asked of it; the message says what."""
 
@@ -161,27 +164,21 @@ class Scores:
     accuracy: Floats = field(repr=False)
     majority: Floats = field(repr=False)
 
-    def take(
-        self,
-        *,
-        size: Sequence[int] | None = None,
-        smoothing: Sequence[str] | None = None,
-        select: Sequence[str] | None = None,
-        order: Sequence[int] | None = None,
-    ) -> Floats:
-        """The accuracies of some cells, all axes kept; MissingCellsError for a value that the grid does not have."""
+    def take(self, **wanted: Sequence[int | str] | None) -> Floats:
+        """The accuracies of the cells with some values of `size`, `smoothing`, `select`, `order`; all axes are kept.
+
+        Raises MissingCellsError for a value that the grid does not have, and for no values.
+        """
         taken = self.accuracy
-        for axis, (name, wanted) in enumerate(
-            (("size", size), ("smoothing", smoothing), ("select", select), ("order", order))
-        ):
-            if wanted is not None:
-                has: tuple[int | str, ...] = getattr(self, name)
-                for value in wanted:
+        for axis, name in enumerate(AXES):
+            values, has = wanted.get(name), getattr(self, name)
+            if values is not None:
+                for value in values:
                     if value not in has:
                         raise MissingCellsError(f"the grid has no {name} {value}")
-                if not wanted:
+                if not values:
                     raise MissingCellsError(f"the grid has no {name} for it")
-                taken = taken.take([has.index(value) for value in wanted], axis=axis)
+                taken = taken.take([has.index(value) for value in values], axis=axis)
         return taken
 
 
@@ -193,9 +190,7 @@ def mean(cells: Floats) -> Floats:
 
 def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
     """The accuracies of all cells in rows of one kind of transition, really and in draws of the test sequences."""
-    size, smoothing, select, order = axes = tuple(
-        tuple(sorted({getattr(row, name) for row in rows})) for name in ("size", "smoothing", "select", "order")
-    )
+    size, smoothing, select, order = axes = tuple(tuple(sorted({getattr(row, name) for row in rows})) for name in AXES)
     names = tuple(sorted({name for row in rows for name in row.sequences}))
     right = np.zeros((*map(len, axes), len(names)))
     place = [{value: i for i, value in enumerate(axis)} for axis in axes]
@@ -203,7 +198,7 @@ def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
     frames, majority = np.zeros(len(names)), np.zeros(len(names))
     seeds = len({row.seed for row in rows})
     for row in rows:
-        cell = tuple(of[value] for of, value in zip(place, _key(row), strict=True))
+        cell = tuple(of[getattr(row, name)] for of, name in zip(place, AXES, strict=True))
         for name, one in row.sequences.items():
             right[(*cell, number[name])] += one.right / seeds
             frames[number[name]], majority[number[name]] = one.frames, one.majority
@@ -225,7 +220,3 @@ def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
 def drawn(sequences: int, draws: int) -> Floats:
     """How often each sequence is there, float64 (1 + draws, sequences): once each, then as a fixed seed draws them."""
     return np.concatenate([np.ones((1, sequences)), draw(sequences, 0, draws).astype(np.float64)])
-
-
-def _key(row: Row) -> tuple[int | str, ...]:
-    return row.size, row.smoothing, row.select, row.order
