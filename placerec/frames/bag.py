@@ -35,7 +35,7 @@ class Bag:
     topic: str
     every: int
     ranks: "array[int]" = field(repr=False, compare=False)
-    frames: tuple[Frame, ...] = field(repr=False, compare=False)
+    listed: tuple[Frame, ...] = field(repr=False, compare=False)
 
     @property
     def endless(self) -> bool:
@@ -44,7 +44,7 @@ class Bag:
     def files(self) -> list[Path]:
         return sorted(path for path in self.path.iterdir() if path.is_file()) if self.path.is_dir() else [self.path]
 
-    def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
         waiting: dict[int, tuple[str, bytes]] = {}
         number = first
         with _opened(self.path) as reader:
@@ -53,11 +53,11 @@ class Bag:
                 if not between and index >= first:
                     waiting[index] = kind, data
                 while number in waiting:
-                    yield self.frames[number], self._gray(self.frames[number], *waiting.pop(number))
+                    yield self.listed[number], self._gray(self.listed[number], *waiting.pop(number))
                     number += 1
-                if number == len(self.frames):
+                if number == len(self.listed):
                     return
-        for frame in self.frames[number:]:
+        for frame in self.listed[number:]:
             yield frame, f"{self.path}: frame {frame.name} cannot be read again"
 
     def _gray(self, frame: Frame, kind: str, data: bytes) -> Gray | str:

@@ -32,9 +32,9 @@ def batches(sequences: Iterable[Sequence]) -> Iterator[tuple[Sequence, Batch]]:
     for sequence in sequences:
         recording = sequence.recording
         if recording is not None and recording.endless:
-            shots = recording.shots()
+            rest = recording.frames()
             first = 0
-            while some := tuple(islice(shots, SIZE)):
+            while some := tuple(islice(rest, SIZE)):
                 frames, images = zip(*some, strict=True)
                 yield sequence, Batch(sequence.name, first, frames, images)
                 first += len(some)
@@ -50,14 +50,14 @@ def with_images(
 
     `shrink` makes them smaller, so that little is kept and sent.
     """
-    shots: Iterator[tuple[Frame, Gray | str]] = iter(())
+    rest: Iterator[tuple[Frame, Gray | str]] = iter(())
     current = ""
     for sequence, batch in listed:
         images = batch.images
         if sequence.recording is not None and images is None:
             if sequence.name != current:
-                shots, current = sequence.recording.shots(batch.first), sequence.name
-            found = {frame.name: shrink(image) for frame, image in islice(shots, len(batch.frames))}
+                rest, current = sequence.recording.frames(batch.first), sequence.name
+            found = {frame.name: shrink(image) for frame, image in islice(rest, len(batch.frames))}
             images = tuple(found.get(frame.name, f"{frame.path}: frame {frame.name} is gone") for frame in batch.frames)
         elif images is not None:
             images = tuple(map(shrink, images))

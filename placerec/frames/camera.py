@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from placerec.errors import SourceError
-from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt
 from placerec.frames.image import quiet
+from placerec.frames.live import LatestFrameQueue, LiveFrame, Stopped, ended_by_interrupt
 from placerec.frames.sequence import Frame, Gray, Sequence, SourceOptions
 from placerec.frames.video import grabbed_gray
 
@@ -61,29 +61,29 @@ class Camera:
         address = re.sub(r"^\w+://([^/@]*@)?|[?#].*", "", self.source)
         return re.sub(r"[^\w.-]+", "-", address).strip("-.") or "camera"
 
-    def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
         """The frames from now on, until the camera gives no more or Ctrl-C is pressed; `first` must be 0.
 
         Raises SourceError if the camera cannot be opened, or never gives an image.
         """
-        feed = Feed(self.arrivals, room=HELD)
+        queue = LatestFrameQueue(self.live_frames, room=HELD)
         told = False
-        with closing(feed), ended_by_interrupt(feed):
-            for number, arrival in enumerate(feed):
+        with closing(queue), ended_by_interrupt(queue):
+            for number, live in enumerate(queue):
                 if not number:
                     log.info("%s: recording until Ctrl-C", self)
-                yield arrival.frame, arrival.image
-                if feed.dropped and not told:
+                yield live.frame, live.image
+                if queue.dropped and not told:
                     log.warning("%s: images come faster than they are worked on; some are dropped", self)
                     told = True
-        log.info("%s: %d images came, %d of them dropped", self, feed.seen, feed.dropped)
+        log.info("%s: %d images came, %d of them dropped", self, queue.seen, queue.dropped)
 
     def files(self) -> list[Path]:
         """None: nothing of a camera is there twice."""
         return []
 
-    def arrivals(self, stopped: Stopped) -> Iterator[Arrival]:
-        """Frames as they come, on the thread that asks for them; raises as `shots` does."""
+    def live_frames(self, stopped: Stopped) -> Iterator[LiveFrame]:
+        """Frames as they come, on the thread that asks for them; raises as `frames` does."""
         positions, began = count(), None
         with quiet(), _opened(self) as capture:
             for damaged in _grabbed(capture, stopped):
@@ -96,7 +96,7 @@ class Camera:
                     frame = Frame(f"{position:06d}", began + came, "", self.path)
                     name = f"{self}: frame {frame.name}"
                     image = grabbed_gray(capture, name) if good else f"{name} cannot be decoded"
-                    yield Arrival(position // self.every, frame, image, came)
+                    yield LiveFrame(position // self.every, frame, image, came)
         if began is None and not stopped():
             raise SourceError(f"{self}: gives no image; look whether another program uses it, and whether it is on")
         if not stopped():

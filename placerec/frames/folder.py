@@ -103,9 +103,9 @@ def list_folder(folder: Path) -> Listing:
 
 def stamp(name: str) -> float | None:
     """The seconds in an image's name, if it is one of COLD or KTH-IDOL2."""
-    found = cold.parse_name(name)
+    found = cold.parse_time(name)
     if found is not None:
-        return found[0]
+        return found
     named = idol.parse_name(name)
     return None if named is None else named.time
 

@@ -18,10 +18,10 @@ def images_at(sequence: Sequence, indices: Ordered[int]) -> Iterator[Gray | str]
     if sequence.recording is None:
         yield from (_read(sequence.frames[index]) for index in indices)
     elif indices:
-        shots = sequence.recording.shots(indices[0])
+        rest = sequence.recording.frames(indices[0])
         here = indices[0]
         for index in indices:
-            _, gray = next(islice(shots, index - here, None))
+            _, gray = next(islice(rest, index - here, None))
             here = index + 1
             yield gray
 
@@ -30,7 +30,7 @@ def all_images(sequence: Sequence) -> Iterator[tuple[Frame, Gray | str]]:
     """Every frame of a sequence with its grey levels, or the reason why it has none."""
     if sequence.recording is None:
         return ((frame, _read(frame)) for frame in sequence.frames)
-    return sequence.recording.shots()
+    return sequence.recording.frames()
 
 
 def files_of(sequence: Sequence) -> list[Path]:

@@ -37,7 +37,7 @@ class Recording(Protocol):
     @property
     def endless(self) -> bool: ...
 
-    def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
         """The frames in order from index `first`, each with its grey levels 0..255 or the reason why it has none."""
 
     def files(self) -> list[Path]:

@@ -29,12 +29,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Video:
-    """Every `every`-th frame of a video file. `times`: of all its frames; `frames`: those that are read."""
+    """Every `every`-th frame of a video file. `times`: of all its frames; `listed`: those that are read."""
 
     path: Path
     every: int
     times: "array[float]" = field(repr=False, compare=False)
-    frames: tuple[Frame, ...] = field(repr=False, compare=False)
+    listed: tuple[Frame, ...] = field(repr=False, compare=False)
 
     @property
     def endless(self) -> bool:
@@ -43,17 +43,17 @@ class Video:
     def files(self) -> list[Path]:
         return [self.path]
 
-    def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
-        if first >= len(self.frames):
+    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+        if first >= len(self.listed):
             return
         with _opened(self.path) as capture:
             for position, decoded in _decoded(capture, self.times, late=self.path.suffix.lower() == ".avi"):
                 index, between = divmod(position, self.every)
                 if between or index < first:
                     continue
-                name = f"{self.path}: frame {self.frames[index].name}"
-                yield self.frames[index], grabbed_gray(capture, name) if decoded else f"{name} cannot be decoded"
-                if index == len(self.frames) - 1:
+                name = f"{self.path}: frame {self.listed[index].name}"
+                yield self.listed[index], grabbed_gray(capture, name) if decoded else f"{name} cannot be decoded"
+                if index == len(self.listed) - 1:
                     return
 
 

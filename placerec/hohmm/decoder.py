@@ -265,7 +265,7 @@ class SequenceDecoder:
             raise ModelError(f"{str(image)!r} is a path, and a word or an image is expected{_image_hint(str(image))}")
         if self.dictionary is None:
             raise ModelError("an image needs a dictionary to become a word; give the recognizer the words.npz")
-        return self.dictionary.look(image)
+        return self.dictionary.word_of(image)
 
 
 def warn_of_unlisted(stream: WordStream, listed: Container[str]) -> None:

@@ -15,8 +15,8 @@ import numpy as np
 from placerec.errors import ModelError, StreamError, VisionError
 from placerec.frames import Frame, Sequence, SourceOptions, find_sequences
 from placerec.frames.camera import Camera
-from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt, paced
 from placerec.frames.images import all_images
+from placerec.frames.live import LatestFrameQueue, LiveFrame, Stopped, ended_by_interrupt, real_time
 from placerec.hohmm import Belief, SequenceDecoder, format_header
 from placerec.methods.decode import format_belief
 from placerec.methods.decoders import HOHMM, make_decoder
@@ -117,37 +117,37 @@ def follow_live(
     """
     tally = _Tally(sequence)
     # Filters are made when they are first needed: not while the first frames wait.
-    dictionary.look(_ANY)
-    with closing(Feed(lambda stopped: _arrivals(sequence, stopped))) as feed, ended_by_interrupt(feed):
+    dictionary.word_of(_ANY)
+    with closing(LatestFrameQueue(lambda stopped: _live_frames(sequence, stopped))) as queue, ended_by_interrupt(queue):
         try:
-            for arrival in feed:
-                for _ in range(tally.missed(arrival)):
+            for live in queue:
+                for _ in range(tally.missed(live)):
                     decoder.skip()
-                belief = _believed(arrival, dictionary, decoder, tally)
+                belief = _believed(live, dictionary, decoder, tally)
                 if belief is not None:
-                    yield arrival.frame, belief
-                    tally.answered(time.monotonic(), arrival)
+                    yield live.frame, belief
+                    tally.answered(time.monotonic(), live)
         finally:
-            feed.stop()
-            report = tally.report(feed)
+            queue.stop()
+            report = tally.report(queue)
             if report.seen:
                 log.info("%s: %s", tally.name, report)
             if tell is not None:
                 tell(report)
 
 
-def _arrivals(sequence: Sequence, stopped: Stopped) -> Iterator[Arrival]:
+def _live_frames(sequence: Sequence, stopped: Stopped) -> Iterator[LiveFrame]:
     if isinstance(sequence.recording, Camera):
-        return sequence.recording.arrivals(stopped)
-    return paced(all_images(sequence), stopped)
+        return sequence.recording.live_frames(stopped)
+    return real_time(all_images(sequence), stopped)
 
 
-def _believed(arrival: Arrival, dictionary: "Dictionary", decoder: SequenceDecoder, tally: "_Tally") -> Belief | None:
-    frame, image = arrival.frame, arrival.image
+def _believed(live: LiveFrame, dictionary: "Dictionary", decoder: SequenceDecoder, tally: "_Tally") -> Belief | None:
+    frame, image = live.frame, live.image
     try:
         if isinstance(image, str):
             raise VisionError(image)
-        word, distance = dictionary.look(image)
+        word, distance = dictionary.word_of(image)
     except VisionError as error:
         tally.unusable(error)
         decoder.skip()
@@ -172,13 +172,13 @@ class _Tally:
         self._latencies: Counter[int] = Counter()
         self._said: dict[str, float] = {}
 
-    def missed(self, arrival: Arrival) -> int:
+    def missed(self, live: LiveFrame) -> int:
         """How many frames were dropped between this one and the one before."""
-        missed = arrival.number - self._next
-        self._next = arrival.number + 1
+        missed = live.number - self._next
+        self._next = live.number + 1
         self._dropped += missed
         if math.isnan(self._first):
-            self._first = arrival.came
+            self._first = live.came
         if missed:
             message = "%s: %d of %d frames dropped so far: they come faster than they are worked on"
             self._say(message, self.name, self._dropped, self._next)
@@ -189,20 +189,20 @@ class _Tally:
         self._unusable += 1
         self._say("%s; no belief for this frame, %d such so far", error, self._unusable)
 
-    def answered(self, now: float, arrival: Arrival) -> None:
+    def answered(self, now: float, live: LiveFrame) -> None:
         """Take note that the answer to a frame was taken."""
-        latency = max(now - arrival.came, 1e-9)
+        latency = max(now - live.came, 1e-9)
         self._last = now
         self._longest = latency if math.isnan(self._longest) else max(latency, self._longest)
         self._latencies[round(math.log(latency) / _STEP)] += 1
 
-    def report(self, feed: Feed) -> LiveReport:
+    def report(self, queue: LatestFrameQueue) -> LiveReport:
         """What is known by now."""
         answered = self._latencies.total()
         return LiveReport(
-            feed.seen,
+            queue.seen,
             answered,
-            feed.dropped,
+            queue.dropped,
             self._unusable,
             0.0 if math.isnan(self._last) else self._last - self._first,
             self._quantile(0.5),

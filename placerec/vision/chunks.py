@@ -40,7 +40,7 @@ def chunks(source: Source) -> Iterator[Rows]:
         yield np.concatenate(waiting)
 
 
-class Stored:
+class SpooledRows:
     """The chunks of a source, kept for any number of passes; as a stream, too.
 
     `each` maps functions over them; workers on other machines have copies of their own.
@@ -67,15 +67,15 @@ class Stored:
 
 
 @contextmanager
-def stored(source: Source, work: Executor | None = None) -> Iterator[Stored]:
+def spooled(source: Source, work: Executor | None = None) -> Iterator[SpooledRows]:
     """The rows of a source for many passes: in memory up to IN_MEMORY, beyond in a nameless file."""
     with tempfile.SpooledTemporaryFile(IN_MEMORY) as file:
-        yield Stored(file, source, work)
+        yield SpooledRows(file, source, work)
 
 
 def each_chunk(source: Source) -> ScatteredMap[Rows]:
     """Maps functions over the chunks of a source: one function for every pass."""
-    return source.each if isinstance(source, Stored) else lambda function: map(function, chunks(source))
+    return source.each if isinstance(source, SpooledRows) else lambda function: map(function, chunks(source))
 
 
 def check_again(count: int, n: int) -> None:

@@ -19,8 +19,8 @@ from placerec.journal import Journal
 from placerec.vision.external import read_rows
 from placerec.vision.gist import Floats
 from placerec.vision.spec import DescriptorSpec, check_describes_images
-from placerec.vision.storage import Pieces, text_column, write_npz
-from placerec.vision.work import Answer, Tally, answers, describe_batch
+from placerec.vision.storage import StreamedArray, text_column, write_npz
+from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
 
 log = logging.getLogger(__name__)
 
@@ -97,15 +97,15 @@ def describe(
     sequences = list(sequences)
     if matrix is not None:
         return _given(sequences, spec, Path(matrix))
-    spec, tally = spec or DescriptorSpec(), Tally()
-    tables, values = zip(*described(sequences, spec, tally, work=work, progress=progress), strict=True)
-    return Descriptors(spec, np.concatenate(values), FrameTable.concat(tables), tally.skipped, tally.constant)
+    spec, counts = spec or DescriptorSpec(), FrameCounts()
+    tables, values = zip(*described(sequences, spec, counts, work=work, progress=progress), strict=True)
+    return Descriptors(spec, np.concatenate(values), FrameTable.concat(tables), counts.skipped, counts.constant)
 
 
 def described(
     sequences: list[Sequence],
     spec: DescriptorSpec,
-    tally: Tally,
+    counts: FrameCounts,
     *,
     work: Executor | None = None,
     journal: Journal | None = None,
@@ -114,11 +114,11 @@ def described(
     """Batch after batch the frames that have a descriptor, and these (m, spec.length); else as `describe`."""
     check_describes_images(spec)
     function = partial(describe_batch, spec)
-    for batch, answer in answers(
-        function, sequences, spec, tally, key="describe", work=work, journal=journal, progress=progress
+    for batch, result in process_batches(
+        function, sequences, spec, counts, key="describe", work=work, journal=journal, progress=progress
     ):
-        yield FrameTable.of_frames(batch.sequence, answer.frames_of(batch)), answer.arrays["values"]
-    tally.close()
+        yield FrameTable.of_frames(batch.sequence, result.frames_of(batch)), result.arrays["values"]
+    counts.close()
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,13 +127,13 @@ class KeptDescriptors:
 
     spec: DescriptorSpec
     table: FrameTable
-    tally: Tally
+    counts: FrameCounts
     journal: Journal
 
     def pieces(self) -> Iterator[Floats]:
         """The descriptors, batch by batch, again at every call."""
         for content in self.journal.contents():
-            yield Answer.unpack(content).arrays["values"]
+            yield BatchResult.unpack(content).arrays["values"]
 
 
 def keep_described(
@@ -144,9 +144,9 @@ def keep_described(
     progress: Progress | None = None,
 ) -> KeptDescriptors:
     """Describe the frames as `describe` does; the descriptors are left in the journal."""
-    tally = Tally()
-    found = described(sequences, spec, tally, work=work, journal=journal, progress=progress)
-    return KeptDescriptors(spec, FrameTable.concat(table for table, _ in found), tally, journal)
+    counts = FrameCounts()
+    found = described(sequences, spec, counts, work=work, journal=journal, progress=progress)
+    return KeptDescriptors(spec, FrameTable.concat(table for table, _ in found), counts, journal)
 
 
 def _given(sequences: list[Sequence], spec: DescriptorSpec | None, matrix: Path) -> Descriptors:
@@ -172,10 +172,10 @@ def save_descriptors(descriptors: Descriptors | KeptDescriptors, path: Path | st
     """Write descriptors.npz: `descriptors` (n, d) float32, `frames`, `sequences`, `times`, `places` and JSON `meta`."""
     table, spec = descriptors.table, descriptors.spec
     if isinstance(descriptors, Descriptors):
-        values: Floats | Pieces = descriptors.values
-        counts: Descriptors | Tally = descriptors
+        values: Floats | StreamedArray = descriptors.values
+        counts: Descriptors | FrameCounts = descriptors
     else:
-        values, counts = Pieces((len(table), spec.length), descriptors.pieces), descriptors.tally
+        values, counts = StreamedArray((len(table), spec.length), descriptors.pieces), descriptors.counts
     arrays: dict[str, Any] = {
         "descriptors": values,
         "frames": text_column(table.names),

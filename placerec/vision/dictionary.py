@@ -14,7 +14,7 @@ from placerec.errors import VisionError
 from placerec.frames.sequence import Gray
 from placerec.jobs import Executor
 from placerec.version import __version__
-from placerec.vision.chunks import CHUNK, Rows, Source, chunks, stored
+from placerec.vision.chunks import CHUNK, Rows, Source, chunks, spooled
 from placerec.vision.describe import Descriptors
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
 from placerec.vision.quality import MapQuality, map_quality
@@ -134,7 +134,7 @@ class Dictionary:
         if data.n < size * size:
             log.warning("%d frames cannot fill the %d words of a map of size %d", data.n, size * size, size)
         # A fifth of the descriptors, for many passes.
-        with stored(projected(source, pca), work) as codes:
+        with spooled(projected(source, pca), work) as codes:
             som = train_som(
                 codes,
                 size,
@@ -181,16 +181,15 @@ class Dictionary:
         """
         return nearest_units(self._codes(descriptors), self._units)
 
-    def measure(self, descriptors: Rows | Descriptors) -> MapQuality:
+    def quality_of(self, descriptors: Rows | Descriptors) -> MapQuality:
         """How well the map represents these frames, for instance of recordings that trained nothing."""
         return map_quality(self._codes(descriptors), self.codebook, self.hits)
 
-    def see(self, image: Gray) -> str:
-        """The word of one grey image (h, w) of 0..255; VisionError for an image that cannot be used."""
-        return self.look(image)[0]
+    def word_of(self, image: Gray) -> tuple[str, float]:
+        """The word of one grey image (h, w) of 0..255, and its distance from the word's unit in PCA space.
 
-    def look(self, image: Gray) -> tuple[str, float]:
-        """The word of one grey image, and how far from it the image lies (see `words`); raises as `see` does."""
+        Raises VisionError for an image that cannot be used.
+        """
         units, distances = self.words(descriptor(image, self.spec)[None])
         return self.vocabulary[int(units[0])], float(distances[0])
 

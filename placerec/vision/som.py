@@ -202,16 +202,6 @@ def nearest_units(codes: Rows, units: Units) -> tuple[NDArray[np.int64], NDArray
     return found if units.among is None else units.among[found], far
 
 
-def quantisation_error(codes: Rows, codebook: Rows) -> float:
-    """The mean distance of the rows to their nearest unit."""
-    return float(distances(codes, codebook, best_units(codes, codebook)[0]).mean())
-
-
-def topographic_error(codes: Rows, codebook: Rows) -> float:
-    """The share of the rows whose second nearest unit is not one of the 8 neighbours of the nearest."""
-    return float(torn(codes, codebook, best_units(codes, codebook)[0]).mean())
-
-
 def torn(codes: Rows, codebook: Rows, nearest: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which rows (n,) have a second nearest unit that is not one of the 8 neighbours of the nearest."""
     if len(codebook) == 1:

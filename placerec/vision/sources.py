@@ -62,7 +62,7 @@ def train_dictionary(
     """Describe the frames of the sources, fit a dictionary to them (`Dictionary.fit`) and write it to `out`.
 
     `spec`, `matrix`, `work`: see `describe_sources`, which tells of memory and of killed runs, too. `held_out`: sources
-    that train nothing; how well the map represents them (`Dictionary.measure`) is noted. `progress` is called
+    that train nothing; how well the map represents them (`Dictionary.quality_of`) is noted. `progress` is called
     with frames described and in all. Raises as `describe_sources` and `Dictionary.fit` do.
     """
     with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
@@ -86,7 +86,7 @@ def train_dictionary(
             more = describe(
                 others, spec, matrix=matrix, work=work, progress=lambda done, _: tell(seen + done, seen + unseen)
             )
-            _report_held_out(dictionary.measure(more))
+            _report_held_out(dictionary.quality_of(more))
     return dictionary
 
 

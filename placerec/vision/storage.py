@@ -23,7 +23,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class StreamedArray:
     """An array that is not in memory: `pieces()` gives all of its rows, in order; `dtype` as in npy files."""
 
     shape: tuple[int, ...]
@@ -31,7 +31,7 @@ class Pieces:
     dtype: str = "<f4"
 
 
-def text_column(texts: Sequence[str]) -> Pieces:
+def text_column(texts: Sequence[str]) -> StreamedArray:
     """Strings as an array of them, as numpy makes it of a list."""
     dtype = f"<U{max(1, max(map(len, texts), default=0))}"
 
@@ -40,16 +40,16 @@ def text_column(texts: Sequence[str]) -> Pieces:
         while some := list(islice(rest, TOGETHER)):
             yield np.array(some, dtype)
 
-    return Pieces((len(texts),), pieces, dtype)
+    return StreamedArray((len(texts),), pieces, dtype)
 
 
-def write_npz(path: Path, arrays: Mapping[str, NDArray[Any] | Pieces], meta: dict[str, Any]) -> None:
+def write_npz(path: Path, arrays: Mapping[str, NDArray[Any] | StreamedArray], meta: dict[str, Any]) -> None:
     """Write the arrays and `meta` as numpy.savez does, whole or not at all; OutputError if it cannot be written."""
     content = {**arrays, "meta": np.array(_text(meta))}
     with whole_file(Path(path)) as partial, zipfile.ZipFile(partial, "w", allowZip64=True) as archive:
         for name, array in content.items():
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
-                if isinstance(array, Pieces):
+                if isinstance(array, StreamedArray):
                     header = {"descr": array.dtype, "fortran_order": False, "shape": array.shape}
                     np.lib.format.write_array_header_1_0(file, header)
                     for piece in array.pieces():

@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class BatchResult:
     """What was found for a batch: `arrays`, a row for each frame in `kept` (indices in the batch).
 
     `blank`: which of these rows are of an image of one grey level throughout. `reasons`: why the other frames have
@@ -53,7 +53,7 @@ class Answer:
         return file.getvalue()
 
     @classmethod
-    def unpack(cls, data: bytes) -> "Answer":
+    def unpack(cls, data: bytes) -> "BatchResult":
         """What `pack` made; nothing in it is executed."""
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
@@ -61,7 +61,7 @@ class Answer:
 
 
 @dataclass
-class Tally:
+class FrameCounts:
     """How many frames there were so far, how many could not be read, and how many are of one grey level."""
 
     frames: int = 0
@@ -77,7 +77,7 @@ class Tally:
         log.info("%d frames described, %d skipped, %s", read, self.skipped, constant)
 
 
-def describe_batch(spec: DescriptorSpec, batch: Batch) -> Answer:
+def describe_batch(spec: DescriptorSpec, batch: Batch) -> BatchResult:
     """The descriptors of a batch, `values` float32 (m, spec.length): a function of its arguments alone."""
     rows, kept, reasons = [], [], []
     images = batch.images or (None,) * len(batch.frames)
@@ -90,7 +90,7 @@ def describe_batch(spec: DescriptorSpec, batch: Batch) -> Answer:
             kept.append(k)
     values = np.array(rows, np.float32).reshape(len(rows), spec.length)
     blank = np.logical_not(values.any(axis=1))
-    return Answer(np.array(kept, np.int64), np.asarray(blank), tuple(reasons), {"values": values})
+    return BatchResult(np.array(kept, np.int64), np.asarray(blank), tuple(reasons), {"values": values})
 
 
 def describe_frame(frame: Frame, image: Gray | str | None, spec: DescriptorSpec) -> NDArray[np.float32] | str:
@@ -105,17 +105,17 @@ def describe_frame(frame: Frame, image: Gray | str | None, spec: DescriptorSpec)
         return f"{frame.path}: {error}" if image is None else f"{frame.path}: frame {frame.name}: {error}"
 
 
-def answers(
-    function: Callable[[Batch], Answer],
+def process_batches(
+    function: Callable[[Batch], BatchResult],
     sequences: Sequence[FrameSequence],
     spec: DescriptorSpec,
-    tally: Tally,
+    counts: FrameCounts,
     *,
     key: str,
     work: Executor | None = None,
     journal: Journal | None = None,
     progress: Progress | None = None,
-) -> Iterator[tuple[Batch, Answer]]:
+) -> Iterator[tuple[Batch, BatchResult]]:
     """`function` of every batch of the sequences, in order; what could not be read is named in warnings and counted.
 
     `key`: what the answers depend on besides the images; by it, `journal` gives back those of a run that was cut
@@ -125,30 +125,30 @@ def answers(
     # Ctrl-C ends what a camera records, and would end other processes.
     work = workers() if endless or work is None else work
     total = 0 if endless else sum(len(sequence.frames) for sequence in sequences)
-    for batch, answer in _found(function, sequences, spec, key, work, None if endless else journal):
-        for reason in answer.reasons:
+    for batch, result in _found(function, sequences, spec, key, work, None if endless else journal):
+        for reason in result.reasons:
             log.warning("%s; the frame is skipped", reason)
-        blank = answer.kept[answer.blank].tolist()
-        if blank and not tally.constant:
+        blank = result.kept[result.blank].tolist()
+        if blank and not counts.constant:
             frame = batch.frames[blank[0]]
             where = frame.path if frame.path.name == frame.name else f"{frame.path}: frame {frame.name}"
             log.warning("%s: of one grey level throughout; its descriptor is zero", where)
-        tally.frames += len(batch.frames)
-        tally.skipped += len(answer.reasons)
-        tally.constant += len(blank)
+        counts.frames += len(batch.frames)
+        counts.skipped += len(result.reasons)
+        counts.constant += len(blank)
         if progress is not None:
-            progress(tally.frames, total)
-        yield batch, answer
+            progress(counts.frames, total)
+        yield batch, result
 
 
 def _found(
-    function: Callable[[Batch], Answer],
+    function: Callable[[Batch], BatchResult],
     sequences: Sequence[FrameSequence],
     spec: DescriptorSpec,
     key: str,
     work: Executor,
     journal: Journal | None,
-) -> Iterator[tuple[Batch, Answer]]:
+) -> Iterator[tuple[Batch, BatchResult]]:
     listed = batches(sequences)
 
     def key_of(sequence: FrameSequence, batch: Batch) -> bytes:
@@ -161,7 +161,7 @@ def _found(
             if data is None:
                 ahead = [(sequence, batch)]
                 break
-            yield batch, Answer.unpack(data)
+            yield batch, BatchResult.unpack(data)
     # What is handed out is remembered until its answer comes: frames and keys, not images.
     pending: deque[tuple[Batch, bytes]] = deque()
 
@@ -171,11 +171,11 @@ def _found(
             yield sequence, batch
 
     given = with_images(handed_out(), lambda image: _shrunk(image, spec))
-    for answer in work(function, map(_absolute, given) if isinstance(work, RemoteExecutor) else given):
+    for result in work(function, map(_absolute, given) if isinstance(work, RemoteExecutor) else given):
         batch, its = pending.popleft()
         if journal is not None:
-            journal.add(its, answer.pack())
-        yield batch, answer
+            journal.add(its, result.pack())
+        yield batch, result
 
 
 def _absolute(batch: Batch) -> Batch:

@@ -14,7 +14,7 @@ from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal
 from placerec.vision import Descriptors, Dictionary, describe
 from placerec.vision.spec import check_describes_images
-from placerec.vision.work import Answer, Tally, answers, describe_batch
+from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
 from placerec.words.folder import OWNED, fill_folder
 from placerec.words.stream import WordStream
 
@@ -76,11 +76,11 @@ def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStre
     return streams
 
 
-def tokenize_batch(dictionary: Dictionary, batch: Batch) -> Answer:
+def tokenize_batch(dictionary: Dictionary, batch: Batch) -> BatchResult:
     """The units int64 (m,) and distances float32 (m,) of a batch's frames: a function of its arguments alone."""
     found = describe_batch(dictionary.spec, batch)
     units, distances = dictionary.words(found.arrays["values"])
-    return Answer(found.kept, found.blank, found.reasons, {"units": units, "distances": distances})
+    return BatchResult(found.kept, found.blank, found.reasons, {"units": units, "distances": distances})
 
 
 def _parts(
@@ -114,13 +114,15 @@ def _tokenized(
     progress: Progress | None,
 ) -> Iterator[WordStream]:
     check_describes_images(dictionary.spec)
-    function, tally, key = partial(tokenize_batch, dictionary), Tally(), dictionary.fingerprint
-    found = answers(function, sequences, dictionary.spec, tally, key=key, work=work, journal=journal, progress=progress)
+    function, counts, key = partial(tokenize_batch, dictionary), FrameCounts(), dictionary.fingerprint
+    found = process_batches(
+        function, sequences, dictionary.spec, counts, key=key, work=work, journal=journal, progress=progress
+    )
     vocabulary = dictionary.vocabulary
-    for batch, answer in found:
-        frames = answer.frames_of(batch)
+    for batch, result in found:
+        frames = result.frames_of(batch)
         if frames:
-            words = tuple(vocabulary[unit] for unit in answer.arrays["units"].tolist())
+            words = tuple(vocabulary[unit] for unit in result.arrays["units"].tolist())
             table = FrameTable.of_frames(batch.sequence, frames)
-            yield WordStream(batch.sequence, table, words, answer.arrays["distances"].astype(float))
-    tally.close()
+            yield WordStream(batch.sequence, table, words, result.arrays["distances"].astype(float))
+    counts.close()

@@ -33,7 +33,7 @@ from placerec.frames import find_sequences
 from placerec.jobs import RemoteExecutor
 from placerec.model import train_lm
 from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe_sources
-from placerec.vision.chunks import stored
+from placerec.vision.chunks import spooled
 from placerec.vision.pca import fit_pca, moments, project
 from placerec.vision.som import train_som
 from placerec.words import WordStream, write_stream, write_vocabulary
@@ -167,7 +167,7 @@ def jobs(sources: list[Path], rows: int, folder: Path) -> list[tuple[str, int, J
     write_vocabulary(words.vocabulary, folder / "tokens/vocab.txt")
 
     def epochs(work: RemoteExecutor | None) -> None:
-        with stored(codes, work) as kept:
+        with spooled(codes, work) as kept:
             train_som(kept, SIDE, rng=np.random.default_rng(0), epochs=EPOCHS)
 
     return [

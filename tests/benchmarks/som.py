@@ -18,7 +18,8 @@ import numpy as np
 from minisom import MiniSom
 from numpy.typing import NDArray
 
-from placerec.vision.som import quantisation_error, topographic_error, train_som
+from placerec.vision.quality import map_quality
+from placerec.vision.som import train_som
 
 SIDE, COMPONENTS, SPOTS = 20, 80, 300
 EPOCHS = (2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 50)
@@ -70,8 +71,9 @@ def timed(name: str, train: Callable[[], Rows], held_out: Rows) -> tuple[float, 
     start = time.perf_counter()
     codebook = train()
     seconds = time.perf_counter() - start
-    error = quantisation_error(held_out, codebook)
-    print(f"{name:44} {seconds:8.2f} s   QE {error:.4f}   TE {topographic_error(held_out, codebook):.3f}", flush=True)
+    quality = map_quality(held_out, codebook, np.ones(len(codebook), np.int64))
+    error = quality.quantisation_error
+    print(f"{name:44} {seconds:8.2f} s   QE {error:.4f}   TE {quality.topographic_error:.3f}", flush=True)
     return seconds, error
 
 

@@ -26,9 +26,9 @@ def found(path: Path, topic: str | None = None, every: int = 1) -> Sequence:
 
 def read(sequence: Sequence, first: int = 0) -> list[Gray | str]:
     assert sequence.recording is not None
-    shots = list(sequence.recording.shots(first))
-    assert [frame for frame, _ in shots] == list(sequence.frames[first:])
-    return [gray for _, gray in shots]
+    images = list(sequence.recording.frames(first))
+    assert [frame for frame, _ in images] == list(sequence.frames[first:])
+    return [gray for _, gray in images]
 
 
 def failure(path: Path, topic: str | None = None) -> str:

@@ -75,7 +75,7 @@ DEVICES = [
 @pytest.mark.skipif(sys.platform != "linux", reason="device files are Linux's")
 def test_devices_that_are_no_cameras(source: str, message: str) -> None:
     with pytest.raises(SourceError) as raised:
-        list(Camera(source).shots())
+        list(Camera(source).frames())
     assert str(raised.value).startswith(message)
 
 
@@ -85,36 +85,36 @@ def test_addresses_without_a_camera(tmp_path: Path) -> None:
         pass
     for address in (gone, "gopher://127.0.0.1/x"):
         with pytest.raises(SourceError, match=f"camera:{address}: cannot be opened as a camera; check the address"):
-            list(Camera(address).shots())
+            list(Camera(address).frames())
     with network_camera([]) as silent, network_camera(page) as other:
         for address in (silent, other):
             with pytest.raises(SourceError, match=f"camera:{address}: (cannot be opened|gives no image)"):
-                list(Camera(address).shots())
+                list(Camera(address).frames())
 
 
 def test_a_camera_that_is_silent_is_given_up(monkeypatch: pytest.MonkeyPatch, pictures: list[bytes]) -> None:
     monkeypatch.setattr("placerec.frames.camera.WAIT", 1)
     begin = time.monotonic()
     with network_camera([], hang=True) as address, pytest.raises(SourceError, match="cannot be opened as a camera"):
-        list(Camera(address).shots())
+        list(Camera(address).frames())
     with network_camera(pictures, hang=True) as address:
-        assert len(list(Camera(address).shots())) == len(pictures)
+        assert len(list(Camera(address).frames())) == len(pictures)
     assert time.monotonic() - begin < 40
 
 
 def test_a_network_camera_gives_what_it_sees(pictures: list[bytes], caplog: pytest.LogCaptureFixture) -> None:
     with network_camera(pictures) as address, caplog.at_level(logging.INFO):
         begin = time.time()
-        shots = list(Camera(address).shots())
-        assert len(shots) == len(pictures)
-    for number, ((frame, image), picture) in enumerate(zip(shots, pictures, strict=True)):
+        images = list(Camera(address).frames())
+        assert len(images) == len(pictures)
+    for number, ((frame, image), picture) in enumerate(zip(images, pictures, strict=True)):
         expected = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_GRAYSCALE)
         assert expected is not None
         assert isinstance(image, np.ndarray)
         assert frame.name == f"{number:06d}"
         # Two decoders of JPEG, one of which goes through colours, on noise.
         assert np.abs(image.astype(float) - expected).mean() < 2
-    times = [frame.time for frame, _ in shots]
+    times = [frame.time for frame, _ in images]
     assert times == sorted(times)
     assert begin - 1 < times[0] < times[-1] < time.time() + 1
     assert f"camera:{address}: gives no more images" in caplog.text
@@ -125,7 +125,7 @@ def test_every_so_many_images(pictures: list[bytes]) -> None:
     with network_camera(pictures) as address:
         (sequence,) = find_sequences([f"camera:{address}"], options=SourceOptions(every=5), endless=True)
         assert sequence.recording is not None
-        assert [frame.name for frame, _ in sequence.recording.shots()] == ["000000", "000005", "000010"]
+        assert [frame.name for frame, _ in sequence.recording.frames()] == ["000000", "000005", "000010"]
 
 
 def test_a_camera_has_neither_labels_nor_topics() -> None:
@@ -137,16 +137,16 @@ def test_a_camera_has_neither_labels_nor_topics() -> None:
 def test_damaged_images_do_not_end_it(pictures: list[bytes]) -> None:
     damaged = [*pictures[:4], b"\xff\xd8 no image \xff\xd9", pictures[4][: len(pictures[4]) // 2], *pictures[6:]]
     with network_camera(damaged) as address:
-        shots = list(Camera(address).shots())
-    assert [int(frame.name) for frame, _ in shots] == [*range(len(pictures))]
-    assert [isinstance(image, str) for _, image in shots] == [number in (4, 5) for number in range(len(pictures))]
-    assert shots[5][1] == f"camera:{address}: frame 000005 cannot be decoded"
+        images = list(Camera(address).frames())
+    assert [int(frame.name) for frame, _ in images] == [*range(len(pictures))]
+    assert [isinstance(image, str) for _, image in images] == [number in (4, 5) for number in range(len(pictures))]
+    assert images[5][1] == f"camera:{address}: frame 000005 cannot be decoded"
 
 
 def test_nothing_of_opencv_or_ffmpeg_reaches_stderr(pictures: list[bytes]) -> None:
     """In a process of its own: their levels are read once, and what they write does not go through sys.stderr."""
     code = "import sys; from placerec.frames.camera import Camera\nfor s in sys.argv[1:]:\n"
-    code += "    try: print(len(list(Camera(s).shots())))\n    except Exception as error: print(error)"
+    code += "    try: print(len(list(Camera(s).frames())))\n    except Exception as error: print(error)"
     damaged = [*pictures[:6], pictures[6][:200], *pictures[7:]]
     with network_camera(damaged) as address, network_camera([]) as silent:
         sources = (

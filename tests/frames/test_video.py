@@ -45,9 +45,9 @@ def found(path: Path, **source_options: object) -> Sequence:
 
 def read(sequence: Sequence, first: int = 0) -> list[Gray | str]:
     assert sequence.recording is not None
-    shots = list(sequence.recording.shots(first))
-    assert [frame for frame, _ in shots] == list(sequence.frames[first:])
-    return [gray for _, gray in shots]
+    images = list(sequence.recording.frames(first))
+    assert [frame for frame, _ in images] == list(sequence.frames[first:])
+    return [gray for _, gray in images]
 
 
 def equal(one: list[Gray | str], other: list[NDArray[np.uint8]]) -> bool:
@@ -213,7 +213,7 @@ def test_nothing_is_written_to_stderr_but_what_is_said_here(tmp_path: Path) -> N
         "import sys\nfrom placerec.frames import find_sequences\nfrom placerec.errors import SourceError\n"
         "import logging; logging.disable()\n"
         "for path in sys.argv[1:]:\n"
-        "    try:\n        print(len(list(find_sequences([path])[0].recording.shots())))\n"
+        "    try:\n        print(len(list(find_sequences([path])[0].recording.frames())))\n"
         "    except SourceError as error:\n        print('no')\n"
     )
     paths = sorted(map(str, tmp_path.iterdir()))

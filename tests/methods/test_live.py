@@ -28,7 +28,7 @@ from placerec.vision.sources import train_dictionary
 from placerec.words import read_stream
 from placerec.words.tokenize import tokenize
 
-Shots = Sequence[tuple[Frame, Gray] | tuple[Frame, Gray | str]]
+Images = Sequence[tuple[Frame, Gray] | tuple[Frame, Gray | str]]
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +47,12 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Recorded:
     """A recording that waits until each frame is answered (`turns`), or tells when all are out (`over`)."""
 
-    given: Shots
+    given: Images
     turns: threading.Semaphore | None = None
     over: threading.Event = field(default_factory=threading.Event)
     endless = False
 
-    def shots(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
         for shot in self.given[first:]:
             if self.turns is not None:
                 assert self.turns.acquire(timeout=60)
@@ -63,23 +63,23 @@ class Recorded:
         return []
 
 
-def recorded(shots: Shots, turns: threading.Semaphore | None = None) -> tuple[FrameSequence, Recorded]:
-    recording = Recorded(shots, turns)
-    return FrameSequence("run", [frame for frame, _ in shots], Path("run"), recording), recording
+def recorded(images: Images, turns: threading.Semaphore | None = None) -> tuple[FrameSequence, Recorded]:
+    recording = Recorded(images, turns)
+    return FrameSequence("run", [frame for frame, _ in images], Path("run"), recording), recording
 
 
-def shots_of(folder: Path, seconds: float = 0.0) -> list[tuple[Frame, Gray]]:
+def images_of(folder: Path, seconds: float = 0.0) -> list[tuple[Frame, Gray]]:
     """The images of a sequence, `seconds` apart."""
     (sequence,) = find_sequences([folder])
     return [(replace(frame, time=i * seconds), read_gray(frame.path)) for i, frame in enumerate(sequence.frames)]
 
 
 def followed(
-    shots: Shots, world: Path, options: Decoding = PAPER, method: str = "hohmm"
+    images: Images, world: Path, options: Decoding = PAPER, method: str = "hohmm"
 ) -> tuple[list[tuple[Frame, Belief]], LiveReport]:
     """What comes of frames each of which waits until the one before is decoded."""
     turns, reports = threading.Semaphore(1), list[LiveReport]()
-    sequence, _ = recorded(shots, turns)
+    sequence, _ = recorded(images, turns)
     decoder = load_decoder(method, world / "model", options=options)
 
     def in_turn(work: Callable[..., Belief]) -> Callable[..., Belief]:
@@ -114,7 +114,7 @@ def test_the_same_as_from_files(method: str, options: Decoding, world: Path) -> 
     stream = with_columns(stream, times=np.arange(len(stream)) * 0.004)
     expected = load_decoder(method, world / "model", options=options).decode(stream)
     started = time.monotonic()
-    answers, report = followed(shots_of(world / "runs/seq2", 0.004), world, options, method)
+    answers, report = followed(images_of(world / "runs/seq2", 0.004), world, options, method)
     assert 0 < report.seconds <= time.monotonic() - started
     assert [frame.name for frame, _ in answers] == list(expected.frames)
     assert [frame.place for frame, _ in answers] == list(expected.truth)
@@ -144,8 +144,10 @@ def test_the_lines_are_those_of_a_file(world: Path) -> None:
 
 
 def test_whoever_is_slow_gets_the_newest_and_is_told(world: Path, caplog: pytest.LogCaptureFixture) -> None:
-    shots = [(replace(frame, name=str(i)), image) for i, (frame, image) in enumerate(5 * shots_of(world / "runs/seq2"))]
-    sequence, recording = recorded(shots)
+    images = [
+        (replace(frame, name=str(i)), image) for i, (frame, image) in enumerate(5 * images_of(world / "runs/seq2"))
+    ]
+    sequence, recording = recorded(images)
     decoder, reports = load_decoder("hohmm", world / "model"), list[LiveReport]()
     assert isinstance(decoder, Recognizer)
     names = []
@@ -166,8 +168,8 @@ def test_whoever_is_slow_gets_the_newest_and_is_told(world: Path, caplog: pytest
 
 
 def test_frames_without_an_image_are_counted(world: Path, caplog: pytest.LogCaptureFixture) -> None:
-    (first, image), (second, _), (third, _), last, *_ = shots_of(world / "runs/seq2")
-    damaged: Shots = [(first, image), (second, "frame 1 is damaged"), (third, image[:4]), last]
+    (first, image), (second, _), (third, _), last, *_ = images_of(world / "runs/seq2")
+    damaged: Images = [(first, image), (second, "frame 1 is damaged"), (third, image[:4]), last]
     answers, report = followed(damaged, world)
     assert [frame.name for frame, _ in answers] == [first.name, last[0].name]
     assert (report.seen, report.answered, report.unusable, report.dropped) == (4, 2, 2, 0)
@@ -178,13 +180,15 @@ def test_frames_without_an_image_are_counted(world: Path, caplog: pytest.LogCapt
 
 
 def test_times_that_go_back_and_times_that_are_missing(world: Path) -> None:
-    shots = [(replace(frame, time=float(-i)), image) for i, (frame, image) in enumerate(shots_of(world / "runs/seq2"))]
-    name = shots[1][0].name
+    images = [
+        (replace(frame, time=float(-i)), image) for i, (frame, image) in enumerate(images_of(world / "runs/seq2"))
+    ]
+    name = images[1][0].name
     with pytest.raises(StreamError, match=f"run: frame '{name}': time goes back from -?0.000000 to -1.000000 s"):
-        followed(shots, world, Decoding(max_gap=5.0))
-    shots = [(replace(frame, time=math.nan), image) for frame, image in shots]
+        followed(images, world, Decoding(max_gap=5.0))
+    images = [(replace(frame, time=math.nan), image) for frame, image in images]
     with pytest.raises(SourceError, match="has no time, and without one it cannot be played live"):
-        followed(shots, world)
+        followed(images, world)
 
 
 @pytest.mark.parametrize("options", [Decoding(smooth=True), Decoding(viterbi=True), Decoding(explain=True)])

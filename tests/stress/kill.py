@@ -37,7 +37,7 @@ class DisturbedError(Exception):
 
 
 @dataclass
-class Tally:
+class FrameCounts:
     """What the kills met: something written and not all of it, results in a journal, an end that came before them."""
 
     seconds: float = 0.0
@@ -121,10 +121,10 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 PARALLEL = ("tokenize", "train-words", "experiment")
 
 
-def disturb(name: str, jobs: str, world: Path, kills: int, generator: random.Random) -> Tally:
+def disturb(name: str, jobs: str, world: Path, kills: int, generator: random.Random) -> FrameCounts:
     """Run a command undisturbed, and then `kills` times killed and run again."""
     args = (*COMMANDS[name], *(("--jobs", jobs) if name in PARALLEL else ()))
-    work, place, tally = typed(*args), world / "place", Tally()
+    work, place, tally = typed(*args), world / "place", FrameCounts()
     begin(world, name)
     began = time.monotonic()
     started(work, world)()

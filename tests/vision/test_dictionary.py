@@ -96,10 +96,10 @@ def test_live_units_answer_and_dead_ones_only_if_asked_for() -> None:
     assert (every.hits[every.words(elsewhere)[0]] == 0).any()
 
 
-def test_see_is_the_word_of_the_image(dictionary: Dictionary) -> None:
+def test_an_image_has_the_word_of_its_descriptor(dictionary: Dictionary) -> None:
     image = np.random.default_rng(0).integers(0, 256, (60, 80)).astype(np.uint8)
-    units, _ = dictionary.words(descriptor(image, SPEC)[None])
-    assert dictionary.see(image) == dictionary.vocabulary[units[0]]
+    units, distances = dictionary.words(descriptor(image, SPEC)[None])
+    assert dictionary.word_of(image) == (dictionary.vocabulary[units[0]], float(distances[0]))
 
 
 def test_seeds(tmp_path: Path, dictionary: Dictionary) -> None:
@@ -178,15 +178,15 @@ def test_descriptors_of_another_kind_are_refused(dictionary: Dictionary) -> None
     rows = sample(3)
     mine = Descriptors(SPEC, rows, FrameTable.of("run", ["a", "b", "c"]))
     np.testing.assert_array_equal(dictionary.words(mine)[0], dictionary.words(rows)[0])
-    assert dictionary.measure(mine) == dictionary.measure(rows)
+    assert dictionary.quality_of(mine) == dictionary.quality_of(rows)
     other = replace(mine, spec=DescriptorSpec("classic"))
-    for work in (dictionary.words, dictionary.measure):
+    for work in (dictionary.words, dictionary.quality_of):
         with pytest.raises(VisionError, match=r"the descriptors are of another kind .*'classic'.* the dictionary's"):
             work(other)
 
 
 def test_quality_is_measured_on_training_and_on_other_frames(dictionary: Dictionary) -> None:
-    trained, quality = dictionary.measure(sample()), dictionary.quality
+    trained, quality = dictionary.quality_of(sample()), dictionary.quality
     assert (trained.frames, trained.unseen, trained.dead) == (300, 0, dictionary.dead)
     assert (trained.quantisation_error, trained.topographic_error, trained.entropy, trained.dead) == (
         quality.quantisation_error,
@@ -197,7 +197,7 @@ def test_quality_is_measured_on_training_and_on_other_frames(dictionary: Diction
     shares = dictionary.hits[dictionary.hits > 0] / 300
     assert quality.entropy == pytest.approx(-(shares * np.log2(shares)).sum())
     elsewhere = np.random.default_rng(5).random((400, 384)).astype(np.float32) * 0.2
-    others = dictionary.measure(elsewhere)
+    others = dictionary.quality_of(elsewhere)
     assert others.quantisation_error != trained.quantisation_error
     # The nearest of all units, dead ones among them, though `words` answers with live ones.
     units, _ = replace(dictionary, training=replace(dictionary.training, units="all")).words(elsewhere)

@@ -224,4 +224,4 @@ def test_a_dictionary_of_a_matrix(runs: list[Sequence], tmp_path: Path) -> None:
     with pytest.raises(VisionError, match="the descriptors have 6 values, and the dictionary's have 5"):
         loaded.words(features(d=6))
     with pytest.raises(VisionError, match="were computed elsewhere"):
-        loaded.see(np.zeros((20, 20), np.uint8))
+        loaded.word_of(np.zeros((20, 20), np.uint8))

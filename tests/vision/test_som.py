@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.vision.chunks import CHUNK, Stream, chunks
-from placerec.vision.quality import map_quality
-from placerec.vision.som import RULES, Som, best_units, quantisation_error, topographic_error, train_som
+from placerec.vision.quality import MapQuality, map_quality
+from placerec.vision.som import RULES, Som, best_units, train_som
 
 
 def sample(n: int = 600, d: int = 6, seed: int = 0) -> NDArray[np.float32]:
@@ -35,6 +35,10 @@ def brute_force(codes: NDArray[np.float32], codebook: NDArray[np.float32]) -> ND
     difference = codes[:, None].astype(np.float64) - codebook[None]
     distances: NDArray[np.float64] = np.sqrt((difference**2).sum(axis=2))
     return distances
+
+
+def quality_of(codes: NDArray[np.float32], codebook: NDArray[np.float32]) -> MapQuality:
+    return map_quality(codes, codebook, np.ones(len(codebook), np.int64))
 
 
 def test_same_seed_same_bytes_and_another_seed_another_map() -> None:
@@ -92,7 +96,7 @@ def test_the_final_width_is_an_option() -> None:
     codes = sample(2000)
     narrow, usual, wide = train(codes, width=0.1), train(codes), train(codes, width=2.0)
     assert usual.codebook.tobytes() == train(codes, width=0.5).codebook.tobytes()
-    errors = [quantisation_error(codes, som.codebook) for som in (narrow, usual, wide)]
+    errors = [quality_of(codes, som.codebook).quantisation_error for som in (narrow, usual, wide)]
     assert errors == sorted(errors)
     # Wider than the map from the start: every unit is near the mean of all.
     flat = train(codes, width=50.0).codebook
@@ -137,7 +141,10 @@ def test_the_online_map_learns_and_repeats_itself() -> None:
     assert (som.codebook != train(codes, seed=1, rule="online", epochs=5).codebook).any()
     assert [told[:2] for told in seen] == [(epoch, 5) for epoch in range(1, 6)]
     assert seen[-1][2] < 0.5 * seen[0][2]
-    assert quantisation_error(codes, som.codebook) < 1.3 * quantisation_error(codes, train(codes).codebook)
+    assert (
+        quality_of(codes, som.codebook).quantisation_error
+        < 1.3 * quality_of(codes, train(codes).codebook).quantisation_error
+    )
 
 
 def test_the_quantisation_error_falls_and_is_reported() -> None:
@@ -146,7 +153,7 @@ def test_the_quantisation_error_falls_and_is_reported() -> None:
     assert [epoch for epoch, _, _ in seen] == list(range(1, som.epochs + 1))
     assert {epochs for _, epochs, _ in seen} == {50}
     errors = [error for _, _, error in seen]
-    final = quantisation_error(codes, som.codebook)
+    final = quality_of(codes, som.codebook).quantisation_error
     assert final < 0.5 * errors[0]
     assert final == pytest.approx(brute_force(codes, som.codebook).min(axis=1).mean())
 
@@ -170,9 +177,9 @@ def test_neighbours_on_the_lattice_are_neighbours_in_space() -> None:
     # A flat sheet: an ordered map has neighbouring first and second units nearly everywhere.
     codes = np.random.default_rng(0).uniform(-1, 1, (2000, 2)).astype(np.float32)
     som = train(codes, size=8)
-    assert topographic_error(codes, som.codebook) < 0.05
+    assert quality_of(codes, som.codebook).topographic_error < 0.05
     shuffled = som.codebook[np.random.default_rng(0).permutation(64)]
-    assert topographic_error(codes, shuffled) > 0.5
+    assert quality_of(codes, shuffled).topographic_error > 0.5
 
 
 def test_topographic_error_by_hand() -> None:
@@ -180,9 +187,9 @@ def test_topographic_error_by_hand() -> None:
     codebook = np.full((9, 1), 100, np.float32)
     codebook[0], codebook[8] = 0, 1
     codes = np.array([[0.1], [0.2], [0.9]], np.float32)
-    assert topographic_error(codes, codebook) == 1
+    assert quality_of(codes, codebook).topographic_error == 1
     codebook[4], codebook[8] = 1, 100
-    assert topographic_error(codes, codebook) == 0
+    assert quality_of(codes, codebook).topographic_error == 0
 
 
 def test_distances_and_units_are_those_of_brute_force() -> None:
@@ -238,7 +245,7 @@ def test_tiny_maps(size: int) -> None:
     som = train(codes, size=size)
     assert som.codebook.shape == (size * size, 1)
     assert som.hits.sum() == 50
-    assert 0 <= topographic_error(codes, som.codebook) <= 1
+    assert 0 <= quality_of(codes, som.codebook).topographic_error <= 1
     if size == 1:
         np.testing.assert_allclose(som.codebook[0], codes.mean(axis=0), rtol=1e-5)
 
@@ -252,8 +259,6 @@ def test_map_quality_is_that_of_brute_force(n: int) -> None:
     falls = np.bincount(every.argmin(axis=1), minlength=36)
     assert (got.frames, got.dead) == (n, int((falls == 0).sum()))
     assert got.quantisation_error == pytest.approx(every.min(axis=1).mean(), rel=1e-6)
-    assert got.quantisation_error == pytest.approx(quantisation_error(codes, codebook), rel=1e-6)
-    assert got.topographic_error == pytest.approx(topographic_error(codes, codebook))
     shares = falls[falls > 0] / n
     assert got.entropy == pytest.approx(-(shares * np.log2(shares)).sum())
     assert got.unseen == pytest.approx(falls[::3].sum() / n)

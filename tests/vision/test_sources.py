@@ -36,7 +36,7 @@ def test_held_out_frames_train_nothing_and_are_measured(tmp_path: Path, caplog: 
         [tmp_path / "run1"], tmp_path / "other.npz", spec=SPEC, options=DictionaryOptions(size=5)
     )
     assert made.fingerprint == without.fingerprint
-    got = made.measure(describe(find_sequences([tmp_path / "run2"]), SPEC))
+    got = made.quality_of(describe(find_sequences([tmp_path / "run2"]), SPEC))
     assert got.frames == 8
     assert summary == (
         f"held out: 8 frames, {100 * got.unseen:.1f} % of them on words that training never saw; quantisation error "

@@ -23,7 +23,7 @@ _TWICE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Arrival:
+class LiveFrame:
     """Frame `number` (from 0), its grey levels or the reason why it has none, and when it came by time.monotonic()."""
 
     number: int
@@ -32,23 +32,23 @@ class Arrival:
     came: float
 
 
-class Feed:
-    """Iterates over what `arrivals` gives, which runs in a thread of its own and is asked for the next at once.
+class LatestFrameQueue:
+    """Iterates over what `live_frames` gives, which runs in a thread of its own and is asked for the next at once.
 
     At most `room` frames wait; a newer one takes the place of the oldest, so that nobody lags further behind than
-    that. `arrivals` is called with a function that tells whether to stop. The iteration ends with it, or by `stop`,
+    that. `live_frames` is called with a function that tells whether to stop. The iteration ends with it, or by `stop`,
     which a signal handler may call; what it raises is raised here, after the frames before. `seen`: frames that came;
     `dropped`: those that nobody got.
     """
 
-    def __init__(self, arrivals: Callable[[Stopped], Iterable[Arrival]], room: int = 1) -> None:
+    def __init__(self, live_frames: Callable[[Stopped], Iterable[LiveFrame]], room: int = 1) -> None:
         self.seen = 0
         self.dropped = 0
-        self._waiting: deque[Arrival] = deque(maxlen=room)
+        self._waiting: deque[LiveFrame] = deque(maxlen=room)
         self._news = threading.Condition()
         self._stopped = self._ended = False
         self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._fetch, args=(arrivals,), daemon=True, name="feed")
+        self._thread = threading.Thread(target=self._fetch, args=(live_frames,), daemon=True, name="queue")
         self._thread.start()
 
     def stop(self) -> None:
@@ -60,25 +60,25 @@ class Feed:
         self.stop()
         self._thread.join(_PATIENCE)
 
-    def __iter__(self) -> Iterator[Arrival]:
+    def __iter__(self) -> Iterator[LiveFrame]:
         while True:
             with self._news:
                 while not (self._waiting or self._ended or self._stopped):
                     self._news.wait(_NAP)
-                arrival = self._waiting.popleft() if self._waiting else None
-            if arrival is None:
+                live = self._waiting.popleft() if self._waiting else None
+            if live is None:
                 break
-            yield arrival
+            yield live
         if self._error is not None:
             raise self._error
 
-    def _fetch(self, arrivals: Callable[[Stopped], Iterable[Arrival]]) -> None:
+    def _fetch(self, live_frames: Callable[[Stopped], Iterable[LiveFrame]]) -> None:
         try:
-            for arrival in arrivals(lambda: self._stopped):
+            for live in live_frames(lambda: self._stopped):
                 with self._news:
                     self.seen += 1
                     self.dropped += len(self._waiting) == self._waiting.maxlen
-                    self._waiting.append(arrival)
+                    self._waiting.append(live)
                     self._news.notify()
         except BaseException as error:
             self._error = error
@@ -88,13 +88,13 @@ class Feed:
                 self._news.notify()
 
 
-def paced(shots: Iterable[tuple[Frame, Gray | str]], stopped: Stopped) -> Iterator[Arrival]:
+def real_time(frames: Iterable[tuple[Frame, Gray | str]], stopped: Stopped) -> Iterator[LiveFrame]:
     """A recording as if it happened now: every frame comes so long after the first as its time stamp says.
 
     The next frame is read before it is due. Raises SourceError for a frame without a time.
     """
     begin: float | None = None
-    for number, (frame, image) in enumerate(shots):
+    for number, (frame, image) in enumerate(frames):
         if math.isnan(frame.time):
             raise SourceError(f"{frame.path}: frame {frame.name} has no time, and without one it cannot be played live")
         if begin is None:
@@ -103,12 +103,12 @@ def paced(shots: Iterable[tuple[Frame, Gray | str]], stopped: Stopped) -> Iterat
             time.sleep(min(left, _NAP))
         if stopped():
             return
-        yield Arrival(number, frame, image, time.monotonic())
+        yield LiveFrame(number, frame, image, time.monotonic())
 
 
 @contextmanager
-def ended_by_interrupt(feed: Feed) -> Iterator[None]:
-    """Within, Ctrl-C stops `feed`; another one, a second later or more, is what it always is.
+def ended_by_interrupt(queue: LatestFrameQueue) -> Iterator[None]:
+    """Within, Ctrl-C stops `queue`; another one, a second later or more, is what it always is.
 
     Only the main thread hears of signals; in another nothing changes. Nor does it where interrupts are ignored.
     """
@@ -122,7 +122,7 @@ def ended_by_interrupt(feed: Feed) -> Iterator[None]:
         nonlocal since
         if since is None:
             since = time.monotonic()
-            feed.stop()
+            queue.stop()
         elif time.monotonic() - since >= _TWICE:
             signal.signal(signal.SIGINT, before)
             signal.raise_signal(signal.SIGINT)

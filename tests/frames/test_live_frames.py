@@ -14,7 +14,7 @@ import pytest
 
 from placerec.errors import SourceError
 from placerec.frames import Frame
-from placerec.frames.feed import Arrival, Feed, Stopped, ended_by_interrupt, paced
+from placerec.frames.live import LatestFrameQueue, LiveFrame, Stopped, ended_by_interrupt, real_time
 from placerec.frames.sequence import Gray
 
 IMAGE = np.zeros((8, 8), np.uint8)
@@ -24,78 +24,78 @@ def frame(number: int, seconds: float = 0.0) -> Frame:
     return Frame(str(number), seconds, "", Path("there"))
 
 
-def arrivals(numbers: Iterable[int]) -> Iterator[Arrival]:
-    return (Arrival(number, frame(number), IMAGE, time.monotonic()) for number in numbers)
+def live_frames(numbers: Iterable[int]) -> Iterator[LiveFrame]:
+    return (LiveFrame(number, frame(number), IMAGE, time.monotonic()) for number in numbers)
 
 
-def never_ending(stopped: Stopped) -> Iterator[Arrival]:
+def never_ending(stopped: Stopped) -> Iterator[LiveFrame]:
     number = 0
     while not stopped():
-        yield from arrivals([number])
+        yield from live_frames([number])
         number += 1
         time.sleep(0.002)
 
 
 @pytest.mark.parametrize("room", [1, 3])
 def test_whoever_is_slow_gets_the_newest(room: int) -> None:
-    feed = Feed(lambda stopped: arrivals(range(100)), room)
-    feed._thread.join()
-    with closing(feed):
-        assert [arrival.number for arrival in feed] == [*range(100 - room, 100)]
-        assert (feed.seen, feed.dropped) == (100, 100 - room)
+    queue = LatestFrameQueue(lambda stopped: live_frames(range(100)), room)
+    queue._thread.join()
+    with closing(queue):
+        assert [live.number for live in queue] == [*range(100 - room, 100)]
+        assert (queue.seen, queue.dropped) == (100, 100 - room)
 
 
 def test_who_keeps_up_gets_everything() -> None:
     taken = threading.Semaphore(0)
 
-    def patient(stopped: Stopped) -> Iterator[Arrival]:
-        for arrival in arrivals(range(50)):
-            yield arrival
+    def patient(stopped: Stopped) -> Iterator[LiveFrame]:
+        for live in live_frames(range(50)):
+            yield live
             taken.acquire()
 
     numbers = []
-    with closing(Feed(patient)) as feed:
-        for arrival in feed:
-            numbers.append(arrival.number)
+    with closing(LatestFrameQueue(patient)) as queue:
+        for live in queue:
+            numbers.append(live.number)
             taken.release()
-        assert (numbers, feed.seen, feed.dropped) == ([*range(50)], 50, 0)
+        assert (numbers, queue.seen, queue.dropped) == ([*range(50)], 50, 0)
 
 
 def test_an_error_comes_after_the_frames_before_it() -> None:
-    def broken(stopped: Stopped) -> Iterator[Arrival]:
-        yield from arrivals([0])
+    def broken(stopped: Stopped) -> Iterator[LiveFrame]:
+        yield from live_frames([0])
         raise SourceError("the cable is out")
 
-    feed = Feed(broken)
-    feed._thread.join()
-    iterator = iter(feed)
+    queue = LatestFrameQueue(broken)
+    queue._thread.join()
+    iterator = iter(queue)
     assert next(iterator).number == 0
     with pytest.raises(SourceError, match="the cable is out"):
         next(iterator)
 
 
 def test_stop_ends_the_source_and_the_iteration() -> None:
-    feed = Feed(never_ending)
-    for arrival in feed:
-        if arrival.number >= 3:
-            feed.stop()
-    feed.close()
-    assert not feed._thread.is_alive()
-    assert feed.seen >= 4
+    queue = LatestFrameQueue(never_ending)
+    for live in queue:
+        if live.number >= 3:
+            queue.stop()
+    queue.close()
+    assert not queue._thread.is_alive()
+    assert queue.seen >= 4
 
 
 def test_a_source_that_hangs_does_not_keep_anybody() -> None:
     release = threading.Event()
 
-    def hanging(stopped: Stopped) -> Iterator[Arrival]:
-        yield from arrivals([0])
+    def hanging(stopped: Stopped) -> Iterator[LiveFrame]:
+        yield from live_frames([0])
         release.wait(60)
 
-    feed = Feed(hanging)
-    for _ in feed:
-        feed.stop()
+    queue = LatestFrameQueue(hanging)
+    for _ in queue:
+        queue.stop()
     release.set()
-    feed.close()
+    queue.close()
 
 
 @pytest.fixture
@@ -108,9 +108,9 @@ def interrupts() -> Iterator[None]:
 
 @pytest.mark.usefixtures("interrupts")
 def test_an_interrupt_ends_the_feed() -> None:
-    with closing(Feed(never_ending)) as feed, ended_by_interrupt(feed):
-        for _ in feed:
-            if feed.seen >= 3:
+    with closing(LatestFrameQueue(never_ending)) as queue, ended_by_interrupt(queue):
+        for _ in queue:
+            if queue.seen >= 3:
                 # Twice at once is one.
                 os.kill(os.getpid(), signal.SIGINT)
                 os.kill(os.getpid(), signal.SIGINT)
@@ -119,9 +119,9 @@ def test_an_interrupt_ends_the_feed() -> None:
 
 @pytest.mark.usefixtures("interrupts")
 def test_a_later_interrupt_is_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("placerec.frames.feed._TWICE", 0)
-    with closing(Feed(never_ending)) as feed:
-        with ended_by_interrupt(feed):
+    monkeypatch.setattr("placerec.frames.live._TWICE", 0)
+    with closing(LatestFrameQueue(never_ending)) as queue:
+        with ended_by_interrupt(queue):
             os.kill(os.getpid(), signal.SIGINT)
             with pytest.raises(KeyboardInterrupt):
                 os.kill(os.getpid(), signal.SIGINT)
@@ -131,13 +131,13 @@ def test_a_later_interrupt_is_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("interrupts")
 def test_ignored_interrupts_stay_ignored_and_other_threads_are_not_told() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with closing(Feed(never_ending)) as feed, ended_by_interrupt(feed):
+    with closing(LatestFrameQueue(never_ending)) as queue, ended_by_interrupt(queue):
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     signal.signal(signal.SIGINT, signal.default_int_handler)
     seen = []
 
     def elsewhere() -> None:
-        with closing(Feed(never_ending)) as feed, ended_by_interrupt(feed):
+        with closing(LatestFrameQueue(never_ending)) as queue, ended_by_interrupt(queue):
             seen.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=elsewhere)
@@ -148,14 +148,14 @@ def test_ignored_interrupts_stay_ignored_and_other_threads_are_not_told() -> Non
 
 def test_a_recording_is_played_at_its_own_pace() -> None:
     times = [1e9, 1e9 + 0.1, 1e9 + 0.15, 1e9 + 0.15, 1e9 + 0.3]
-    shots: list[tuple[Frame, Gray | str]] = [(frame(i, seconds), IMAGE) for i, seconds in enumerate(times)]
-    came = [arrival.came for arrival in paced(shots, lambda: False)]
+    images: list[tuple[Frame, Gray | str]] = [(frame(i, seconds), IMAGE) for i, seconds in enumerate(times)]
+    came = [live.came for live in real_time(images, lambda: False)]
     # Never early, whatever the machine is busy with.
     assert all(a - came[0] >= seconds - times[0] - 1e-6 for a, seconds in zip(came, times, strict=True))
-    assert [arrival.number for arrival in paced(shots[:1], lambda: False)] == [0]
-    assert list(paced(shots, lambda: True)) == []
+    assert [live.number for live in real_time(images[:1], lambda: False)] == [0]
+    assert list(real_time(images, lambda: True)) == []
 
 
 def test_frames_without_times_cannot_be_played() -> None:
     with pytest.raises(SourceError, match="there: frame 0 has no time, and without one it cannot be played live"):
-        list(paced([(frame(0, math.nan), IMAGE)], lambda: False))
+        list(real_time([(frame(0, math.nan), IMAGE)], lambda: False))
