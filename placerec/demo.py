@@ -78,8 +78,7 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
         draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title="The words of run 3")
         plot_evaluation(best, evaluate(best), folder / "beliefs.png")
         write_text(
-            folder / "report.html",
-            _report(folder, results, words, len(descriptors.frames), _commands(scale, seed)),
+            folder / "report.html", _report(folder, results, words, len(descriptors.frames), _commands(scale, seed))
         )
     return results
 
@@ -90,13 +89,7 @@ def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
     options = ModelOptions(order=order, smoothing=smoothing)
     corpus = read_corpus([path for path in files if not path.stem.endswith(TEST_RUN)], selection=options.select)
     model = folder / "models" / f"{smoothing}-{order}"
-    train_model(
-        corpus.sentences,
-        corpus.vocabulary,
-        model,
-        options=options,
-        record=corpus.record,
-    )
+    train_model(corpus.sentences, corpus.vocabulary, model, options=options, record=corpus.record)
     recognizer = load_recognizer(model)
     beliefs = [recognizer.decode(read_stream(path)) for path in files if path.stem.endswith(TEST_RUN)]
     for found in beliefs:

@@ -11,15 +11,7 @@ from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints
 from placerec.evaluation.summary import shorten
-from placerec.figures.canvas import (
-    MARGIN,
-    figure_file,
-    letter_colour,
-    panel,
-    picture_file,
-    place_colours,
-    write_line,
-)
+from placerec.figures.canvas import MARGIN, figure_file, letter_colour, panel, picture_file, place_colours, write_line
 from placerec.frames import SourceOptions
 from placerec.frames.sequence import Gray
 from placerec.inspection.words import WordTable, look_up, typical_images, word_sentences

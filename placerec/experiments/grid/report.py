@@ -30,14 +30,7 @@ from placerec.experiments.grid.tables import (
     verdicts_table,
 )
 from placerec.experiments.store import WordsJob, key_of, load, save
-from placerec.figures import (
-    heading,
-    html_page,
-    paragraph,
-    picture,
-    preformatted,
-    table,
-)
+from placerec.figures import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
 from placerec.hohmm import Beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
