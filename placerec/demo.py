@@ -10,8 +10,9 @@ import numpy as np
 
 from placerec.errors import check_optional
 from placerec.evaluation import Evaluation, evaluate
-from placerec.figures import heading, html_page, paragraph, picture, plot_evaluation, preformatted, table
+from placerec.figures import plot_evaluation
 from placerec.figures.canvas import figure_file
+from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import find_sequences, read_gray

@@ -28,7 +28,6 @@ from placerec.jobs import Executor, Progress
 from placerec.version import __version__
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions, describe
 from placerec.vision.storage import read_npz, write_npz
-from placerec.words import WordStream
 from placerec.words.folder import VOCABULARY, write_tokens
 from placerec.words.tokenize import tokens_of
 
@@ -211,12 +210,8 @@ class WordsJob:
         return Dictionary.load(self.words)
 
 
-def streams_of(described: Sequence[Described], dictionary: Dictionary) -> list[WordStream]:
-    """The token streams of some sequences, in their order."""
-    return [stream for one in described for stream in tokens_of(one.load(), dictionary)]
-
-
 def make_tokens(job: WordsJob) -> None:
     """Learn the words and write the token streams, as `placerec train-words` and `placerec tokenize` do."""
     dictionary = job.dictionary()
-    write_tokens(streams_of((*job.train, *job.test), dictionary), dictionary, job.folder)
+    streams = (stream for one in (*job.train, *job.test) for stream in tokens_of(one.load(), dictionary))
+    write_tokens(streams, dictionary, job.folder)

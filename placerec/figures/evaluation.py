@@ -24,12 +24,12 @@ from placerec.figures.panels import (
 )
 from placerec.frames.naming import unique_names
 from placerec.hohmm.beliefs import Beliefs, parse_beliefs, read_beliefs
+from placerec.words.folder import is_stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_STRIPS = 20
-_SUFFIXES = (".tsv", ".tsv.gz")
 
 # Inches.
 _WIDTH, _HEAD = 14.0, 1.15
@@ -137,9 +137,7 @@ def _selection_note(shown: int, all_of_them: int) -> str:
 def _files(sources: list[Path]) -> list[Path]:
     files: dict[str, Path] = {}
     for source in sources:
-        found = (
-            sorted(path for path in source.iterdir() if path.name.endswith(_SUFFIXES)) if source.is_dir() else [source]
-        )
+        found = sorted(path for path in source.iterdir() if is_stream(path)) if source.is_dir() else [source]
         if not found:
             raise EvaluationError(f"{source}: holds no beliefs file (.tsv); write them with `placerec decode -o`")
         for path in found:

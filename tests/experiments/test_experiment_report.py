@@ -12,8 +12,8 @@ from helpers.small_world import write_images
 
 from placerec.cli import commands
 from placerec.experiments.grid import Config, Results, experiment, report
+from placerec.experiments.grid.cells import GridJob
 from placerec.experiments.grid.claims import CLAIMS
-from placerec.experiments.grid.jobs import GridJob
 from placerec.experiments.grid.tables import markdown, ranked
 from placerec.figures import evaluate_files
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from placerec.errors import ExperimentError
-from placerec.experiments.grid.jobs import find_images
+from placerec.experiments.grid.run import find_images
 from placerec.experiments.grid.splits import (
     Fold,
     cold_saarbruecken_b,

@@ -12,9 +12,10 @@ from helpers.small_world import beliefs_of
 
 from placerec.errors import MissingExtraError, OutputError
 from placerec.evaluation import evaluate
-from placerec.figures import belief_strip, confusion_panel, figure_file, plot_evaluation
-from placerec.figures.canvas import place_colours
+from placerec.figures import plot_evaluation
+from placerec.figures.canvas import figure_file, place_colours
 from placerec.figures.evaluation import chosen
+from placerec.figures.panels import belief_strip, confusion_panel
 from placerec.hohmm.beliefs import Beliefs
 
 PLACES = ("corridor", "kitchen", "a$b$c")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from placerec.errors import EvaluationError
-from placerec.figures import heading, html_page, paragraph, picture, preformatted, table
+from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(40))
 NASTY = "<script>alert(\"1\")</script> & 'two'"

@@ -15,7 +15,8 @@ import numpy as np
 from placerec.arrays import Singles
 from placerec.evaluation import evaluate
 from placerec.evaluation.metrics import change_latencies, right_frames
-from placerec.experiments.store import load, save
+from placerec.experiments.grid.splits import Fold
+from placerec.experiments.store import WordsJob, load, save
 from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition
 from placerec.hohmm.decoder import warn_of_unlisted
 from placerec.hohmm.evidence import evidence_in
@@ -55,6 +56,17 @@ class CellJob:
         """What a cell is kept as: all that it depends on beside the job."""
         filter_ = ("learned",) if cell.transition == "learned" else (cell.transition, f"{self.stay!r}", self.per)
         return " ".join((cell.smoothing, str(cell.order), *filter_))
+
+
+@dataclass(frozen=True)
+class GridJob:
+    """The cells of one size, seed, fold and selection; `images`: what made the tokens, None where they were given."""
+
+    size: int
+    seed: int
+    fold: Fold
+    images: WordsJob | None
+    work: CellJob
 
 
 def run_cells(job: CellJob) -> dict[str, Any]:

@@ -15,9 +15,8 @@ import numpy as np
 from placerec.evaluation import Evaluation
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.results import Row, Setting, by_seed
-from placerec.figures import belief_strip, confusion_panel, figure_file, legend_panel
-from placerec.figures.canvas import place_colours
-from placerec.figures.panels import strip_title
+from placerec.figures.canvas import figure_file, place_colours
+from placerec.figures.panels import belief_strip, confusion_panel, legend_panel, strip_title
 from placerec.hohmm import Beliefs
 
 if TYPE_CHECKING:

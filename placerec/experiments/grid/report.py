@@ -11,11 +11,10 @@ from pathlib import Path
 
 from placerec.errors import ExperimentError
 from placerec.evaluation import Evaluation, evaluate
-from placerec.experiments.grid.cells import GridCell, believe_cell
+from placerec.experiments.grid.cells import GridCell, GridJob, believe_cell
 from placerec.experiments.grid.claims import judge
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
-from placerec.experiments.grid.jobs import GridJob
 from placerec.experiments.grid.results import Results, Setting
 from placerec.experiments.grid.tables import (
     Table,
@@ -30,7 +29,7 @@ from placerec.experiments.grid.tables import (
     verdicts_table,
 )
 from placerec.experiments.store import WordsJob, key_of, load, save
-from placerec.figures import heading, html_page, paragraph, picture, preformatted, table
+from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
 from placerec.hohmm import Beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
