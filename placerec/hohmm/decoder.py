@@ -5,7 +5,7 @@ import logging
 import math
 import os
 from collections.abc import Callable, Collection, Container
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
 
@@ -24,15 +24,14 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Belief:
+class Belief(NamedTuple):
     """What is believed after one frame: `probability` float64 (C,) beside `places`, summing to 1.
 
     `unknown`: the probability that the place is none of them, None where nobody asked; the others hold if it is one.
     """
 
-    places: tuple[str, ...] = field(repr=False)
-    probability: Floats = field(repr=False)
+    places: tuple[str, ...]
+    probability: Floats
     word: str
     selected: bool
     unknown: float | None = None
@@ -53,17 +52,9 @@ class Belief:
         return dict(zip(self.places, self.probability.tolist(), strict=True))
 
 
-class Posterior(NamedTuple):
-    """The belief after a selected word, float64 (C,), and `unknown`: that the place is none of them, None if not asked.
-
-    `possible`: whether any place gives the word a probability above 0.
-    """
-
-    probability: Floats
-    unknown: float | None = None
-    possible: bool = True
-
-
+# The belief after a selected word: float64 (C,) in the places; that the place is none of them, None where nobody asked;
+# and whether any place gives the word a probability above 0. A plain tuple: it is made for every frame.
+Posterior = tuple[Floats, float | None, bool]
 # Takes in a selected word: the word, the steps since the selected word before (None for the first), and the distance
 # from the frame's descriptor to the word (None where it is unknown).
 TakeIn = Callable[[str, float | None, float | None], Posterior]
@@ -144,7 +135,10 @@ class SequenceDecoder:
         copied._restart()
         return copied
 
-    def _restart(self) -> None:
+    def _restart(self, per: str = "frame") -> None:
+        """Begin with the settings as they are; `per`: what a step between two selected words is, as of `Transition`."""
+        self._per = per
+        self._needs_times = self.max_gap is not None or per == "second"
         self._zero_likelihood_words = 0
         self.reset()
 
@@ -160,16 +154,7 @@ class SequenceDecoder:
     @property
     def asks_unknown(self) -> bool:
         """Whether beliefs tell the probability that the place is none of `places`."""
-        return self._now.posterior.unknown is not None
-
-    @property
-    def _per(self) -> str:
-        """What a step between two selected words is: `update`, `frame` or `second`."""
-        return "frame"
-
-    @property
-    def _needs_times(self) -> bool:
-        return self.max_gap is not None or self._per == "second"
+        return self._now.posterior[1] is not None
 
     def reset(self) -> None:
         """Forget the sequence so far: the belief is that before any word, and no word has been seen."""
@@ -197,9 +182,10 @@ class SequenceDecoder:
         if selected:
             now.posterior = now.take_in(word, self._steps(now), distance)
             now.updated = now.frame, now.time
-            if not now.posterior.possible:
+            if not now.posterior[2]:
                 self._zero_likelihood_words += 1
-        return self.belief(word, selected)
+        probability, unknown, _ = now.posterior
+        return Belief(self.places, probability.copy(), word, selected, unknown)
 
     def skip(self, time: float | None = None) -> Belief:
         """The belief after one more frame that has no word: it is held, but the frame and its time count."""
@@ -236,18 +222,20 @@ class SequenceDecoder:
 
     def _pass(self, time: float | None, *, needed: bool) -> None:
         """Take note of one more frame; after a gap everything starts anew."""
-        known = time is not None and not math.isnan(time)
-        if needed and not known:
-            raise ModelError(f"the frame has no time, which {self._NEEDING}")
-        if time is not None and known:
-            before = self._now.time
-            if self._needs_times and before is not None and time < before:
-                raise ModelError(f"time goes back from {before:.6f} to {time:.6f} s")
-            if self.max_gap is not None and before is not None and time - before > self.max_gap:
-                log.info("%g s without a frame: a new sequence begins", time - before)
-                self.reset()
-            self._now.time = time
-        self._now.frame += 1
+        now = self._now
+        if time is None or math.isnan(time):
+            if needed:
+                raise ModelError(f"the frame has no time, which {self._NEEDING}")
+        else:
+            if self._needs_times and now.time is not None:
+                if time < now.time:
+                    raise ModelError(f"time goes back from {now.time:.6f} to {time:.6f} s")
+                if self.max_gap is not None and time - now.time > self.max_gap:
+                    log.info("%g s without a frame: a new sequence begins", time - now.time)
+                    self.reset()
+                    now = self._now
+            now.time = time
+        now.frame += 1
 
     def _steps(self, now: _Sequence) -> float | None:
         """Steps since the last selected word, None before the first."""

@@ -82,13 +82,13 @@ class Recognizer(SequenceDecoder):
     def _settings(self) -> str:
         return f"transitions per {self._per}, {super()._settings()}"
 
-    def _restart(self) -> None:
+    def _restart(self, per: str = "") -> None:
         C = len(self.places)
         if len(self.transition.matrix) != C:
             raise ModelError(f"transitions between {len(self.transition.matrix)} places for {C} models")
         self._filter = OnlineFilter(self.transition, [1 / C] * C)
         self._chain = OnlineFilter(new_place.CHAIN, new_place.prior(C))
-        super()._restart()
+        super()._restart(self.transition.per)
 
     def _begin(self) -> tuple[Posterior, TakeIn]:
         self._filter.reset()
@@ -96,10 +96,6 @@ class Recognizer(SequenceDecoder):
         self._score = self.emissions.follow()
         self._taken_in: deque[TakenIn] = deque(maxlen=WINDOW)
         return self._posterior(True), self._take_in
-
-    @property
-    def _per(self) -> str:
-        return self.transition.per
 
     def _take_in(self, word: str, steps: float | None, distance: float | None) -> Posterior:
         if steps is not None:
@@ -121,7 +117,7 @@ class Recognizer(SequenceDecoder):
         if self.calibration is not None:
             probability = self.calibration.apply(probability)
         unknown = None if self.unknown is None else math.exp(self._chain.log_belief[0])
-        return Posterior(probability, unknown, possible)
+        return probability, unknown, possible
 
     def _weigh_unknown(
         self, model: UnknownModel, log10_p: Sequence[float], steps: float | None, distance: float | None

@@ -4,7 +4,6 @@ import json
 import logging
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from placerec.errors import ModelError, OutputError, StreamError, at
@@ -126,7 +125,7 @@ def decode_lines(decoder: SequenceDecoder, lines: Iterable[str], *, as_json: boo
             belief = decoder.update(word, time, distance) if known else decoder.skip(time)
         except ModelError as error:
             raise StreamError(at("<stdin>", frame + 1, str(error))) from error
-        yield format_belief(str(frame), time, "", replace(belief, word=word), as_json=as_json)
+        yield format_belief(str(frame), time, "", belief._replace(word=word), as_json=as_json)
     if strange:
         log.warning("<stdin>: lines skipped because the models do not list their word: %d", strange)
     if never := decoder.zero_likelihood_words:

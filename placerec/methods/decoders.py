@@ -85,18 +85,20 @@ class StepDecoder(SequenceDecoder):
         super().__init__(training.places, self._number, selection=selection, max_gap=max_gap, dictionary=dictionary)
 
     def _begin(self) -> tuple[Posterior, TakeIn]:
-        step, columns = self._make_stepper(), len(self.places) + self._unknown
+        step, number = self._make_stepper(), self._number
+        C = len(self.places)
+        columns = C + self._unknown
+
+        def posterior(belief: Floats) -> Posterior:
+            if columns == C:
+                return belief, None, True
+            known = belief[:-1]
+            return known / known.sum(), float(belief[-1]), True
 
         def take_in(word: str, steps: float | None, distance: float | None) -> Posterior:
-            return self._posterior(step(self._number[word], int(steps or 0)))
+            return posterior(step(number[word], int(steps or 0)))
 
-        return self._posterior(np.full(columns, 1 / columns)), take_in
-
-    def _posterior(self, belief: Floats) -> Posterior:
-        if not self._unknown:
-            return Posterior(belief)
-        known = belief[:-1]
-        return Posterior(known / known.sum(), float(belief[-1]))
+        return posterior(np.full(columns, 1 / columns)), take_in
 
 
 def check_method(name: str, options: Decoding = PAPER, *, scorer: str = "native") -> None:

@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -155,7 +155,7 @@ def _believed(live: LiveFrame, dictionary: "Dictionary", decoder: SequenceDecode
     try:
         if word in decoder:
             return decoder.update(word, frame.time, distance)
-        return replace(decoder.skip(frame.time), word=word)
+        return decoder.skip(frame.time)._replace(word=word)
     except ModelError as error:
         raise StreamError(f"{tally.name}: frame {frame.name!r}: {error}") from error
 

@@ -8,11 +8,8 @@ from numpy.typing import NDArray
 
 from placerec.errors import ModelError
 from placerec.lm import BackoffModel
-from placerec.model.load import PlaceModels
-from placerec.model.record import read_record
-from placerec.model.train import MODEL_JSON, PlaceFiles
-from placerec.words import Sentences, read_sentences, read_vocabulary
-from placerec.words.folder import VOCABULARY
+from placerec.model.folder import PlaceModels
+from placerec.words import Sentences
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,12 +77,11 @@ def read_training_set(model: PlaceModels) -> TrainingSet:
 
     Raises ModelError or StreamError, naming the file, for anything missing or broken.
     """
-    record = read_record(model.path / MODEL_JSON, model.description)
-    added = str(model.description["smoothing"]).startswith("lidstone")
+    record = model.description.record
     return make_training_set(
-        {place: read_sentences(PlaceFiles.of(model.path, place).sentences) for place in model.models},
-        read_vocabulary(model.path / VOCABULARY),
-        delta=float(model.description["delta"]) if added else 1.0,
+        model.folder.sentences(record.places),
+        model.folder.words(),
+        delta=model.description.added_count,
         steps=record.transitions,
         triples=record.triples,
         models=model.models,

@@ -3,9 +3,10 @@
 from placerec.model.calibrate import calibrate
 from placerec.model.corpus import Corpus, read_corpus
 from placerec.model.decoding import Decoding, transition_of
-from placerec.model.load import PlaceModels, load_model
+from placerec.model.folder import PlaceModels, load_model
+from placerec.model.options import ModelOptions, parse_min_count
 from placerec.model.recognize import load_recognizer, make_recognizer
-from placerec.model.train import ModelOptions, estimate_place, parse_min_count, train_lm, train_model
+from placerec.model.train import estimate_place, train_lm, train_model
 from placerec.model.update import update
 
 __all__ = [

@@ -1,7 +1,7 @@
 """Calibration of a MODEL/ folder on labelled sequences that trained nothing of it."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -9,15 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import ModelError
-from placerec.files import held_folder, write_text
+from placerec.files import held_folder
 from placerec.hohmm import Beliefs
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.unknown import measure_distances
 from placerec.model.decoding import PAPER, Decoding, describe_decoding
-from placerec.model.load import PlaceModels, load_model
+from placerec.model.folder import PlaceModels, load_model
 from placerec.model.recognize import make_recognizer, token_streams
-from placerec.model.record import read_distances
-from placerec.model.train import MODEL_JSON, format_description
 from placerec.words import WordStream
 from placerec.words.folder import TokenMaker, dictionary_of, stream_files
 
@@ -37,26 +35,27 @@ def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decod
         streams = token_streams(tokens, models)
         _refuse_training(models, dictionary_of(stream_files(tokens)), streams)
         calibration = fit_calibration(*_judged(models, _decoded(models, streams, options)))
-        found = {
-            **calibration.to_json(),
-            "distances": _measured(models, streams),
-            "options": describe_decoding(models, options),
-            "sequences": [stream.name for stream in streams],
-        }
-        write_text(path / MODEL_JSON, format_description({**models.description, "calibration": found}))
+        models.folder.write(
+            models.description.calibrated(
+                calibration,
+                decoding=describe_decoding(models, options),
+                distances=_measured(models, streams),
+                sequences=[stream.name for stream in streams],
+            )
+        )
     losses = calibration.log_loss_before, calibration.log_loss_after
     log.info("%s: temperature %g, log loss %.3f -> %.3f on these frames", model, calibration.temperature, *losses)
     return calibration
 
 
 def _refuse_training(models: PlaceModels, maker: TokenMaker | None, streams: Sequence[WordStream]) -> None:
-    trained = {item["name"] if isinstance(item, Mapping) else item for item in models.description.get("sequences", ())}
+    trained = models.description.trained_on
     seen = maker.trained_on if maker else frozenset()
     for stream in streams:
         if stream.name in trained or stream.name in seen:
             what = "models" if stream.name in trained else "words"
             raise ModelError(
-                f"{stream.name}: trained the {what} of {models.path}, which is surer of it than of anything new; "
+                f"{stream.name}: trained the {what} of {models.folder}, which is surer of it than of anything new; "
                 "calibrate on labelled sequences that trained neither the words nor the models"
             )
 
@@ -77,7 +76,7 @@ def _judged(models: PlaceModels, decoded: Sequence[Beliefs]) -> tuple[NDArray[np
     if not usable.any():
         names = ", ".join(beliefs.name for beliefs in decoded[:3]) + (", ..." if len(decoded) > 3 else "")
         raise ModelError(
-            f"{names}: no frame is labelled with a place of {models.path}; calibration needs labelled sequences"
+            f"{names}: no frame is labelled with a place of {models.folder}; calibration needs labelled sequences"
         )
     return np.concatenate([beliefs.belief for beliefs in decoded])[usable], truth[usable]
 
@@ -87,12 +86,11 @@ def _columns(models: PlaceModels, labels: Sequence[str]) -> NDArray[np.int64]:
     return np.array([column.get(label, -1) for label in labels], dtype=np.int64)
 
 
-def _measured(models: PlaceModels, streams: Sequence[WordStream]) -> dict[str, float] | None:
+def _measured(models: PlaceModels, streams: Sequence[WordStream]) -> tuple[float, float] | None:
     """How the distances of these frames differ from those in training, for `unknown`; None where there are none."""
-    histograms = read_distances(models.path / MODEL_JSON, models.description)
+    histograms = models.description.distances
     if not histograms:
         return None
     truth = _columns(models, [label for stream in streams for label in stream.places])
     distances = np.concatenate([stream.distances for stream in streams])
-    measured = measure_distances(distances[truth >= 0], truth[truth >= 0], histograms)
-    return measured and {"shift": measured[0], "variance": measured[1]}
+    return measure_distances(distances[truth >= 0], truth[truth >= 0], histograms)

@@ -6,8 +6,7 @@ from typing import Any
 
 from placerec.errors import ModelError
 from placerec.hohmm import Transition, fixed_transition, learned_transition, read_transitions
-from placerec.model.load import PlaceModels
-from placerec.model.record import read_record
+from placerec.model.folder import PlaceModels
 
 STAY, PER = 0.99, "update"
 NAMED = ("fixed", "learned")
@@ -87,10 +86,10 @@ def transition_of(model: PlaceModels, options: Decoding) -> Transition:
     if options.transition == "fixed":
         return fixed_transition(len(model.models), STAY if options.stay is None else options.stay, per)
     if options.transition == "learned":
-        counts = read_record(model.path / "model.json", model.description).transitions
+        counts = model.description.record.transitions
         if counts is None:
             raise ModelError(
-                f"{model.path}: was trained on sentences, which do not tell how often a place follows another; "
+                f"{model.folder}: was trained on sentences, which do not tell how often a place follows another; "
                 "train it on token streams, or choose fixed transitions"
             )
         return learned_transition(counts)

@@ -1,10 +1,8 @@
-"""What model.json keeps of the training sequences: integers only, so that adding and taking away is exact."""
+"""What is recorded of the training sequences: integers only, so that adding and taking away is exact."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,77 +124,3 @@ def _spread(steps: Steps | None, places: Sequence[str], wider: Sequence[str]) ->
     spread = np.zeros((len(wider),) * steps.ndim, np.int64)
     spread[np.ix_(*[[wider.index(place) for place in places]] * steps.ndim)] = steps
     return spread
-
-
-def describe_record(record: Record) -> dict[str, Any]:
-    """The part of model.json that holds a record."""
-    distances = record.distances
-    return {
-        "sequences": [{"name": s.name, "visits": dict(s.visits)} for s in record.sequences],
-        "dictionary": record.dictionary,
-        "transitions": _describe_steps(record),
-        "distances": distances
-        and {place: {str(b): count for b, count in histogram.items()} for place, histogram in distances.items()},
-    }
-
-
-def _describe_steps(record: Record) -> dict[str, Any] | None:
-    if record.transitions is None or record.triples is None:
-        return None
-    seen = np.argwhere(record.triples)
-    triples = [[*route, int(record.triples[tuple(route)])] for route in seen.tolist()]
-    return {"counts": record.transitions.tolist(), "triples": triples}
-
-
-def read_record(path: Path, description: Mapping[str, Any]) -> Record:
-    """The record in the content of the model.json `path`; ModelError if it is not there or not usable."""
-    try:
-        learned = tuple(
-            LearnedSequence(str(item["name"]), {place: _count(n) for place, n in item["visits"].items()})
-            for item in description["sequences"]
-        )
-        places, steps = description["places"], description["transitions"]
-        distances = _distances(description)
-        if Record(learned).places != places or (steps is None) != (distances is None):
-            raise ValueError(places)
-        transitions = steps and np.array([[*map(_count, row)] for row in steps["counts"]], np.int64)
-        triples = steps and _read_triples(steps["triples"], len(places))
-        record = Record(learned, description["dictionary"], transitions, distances, triples)
-        if transitions is not None and transitions.shape != (len(places), len(places)):
-            raise ValueError(transitions.shape)
-        return record
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise ModelError(
-            f"{path}: does not say which visits were learned, as an older placerec or an editor leaves it; "
-            "train the model again"
-        ) from error
-
-
-def _read_triples(listed: Any, C: int) -> Steps:
-    triples = np.zeros((C, C, C), np.int64)
-    for entry in listed:
-        i, j, k, count = map(_count, entry)
-        if max(i, j, k) >= C or j in (i, k):
-            raise ValueError(entry)
-        triples[i, j, k] = count
-    return triples
-
-
-def read_distances(path: Path, description: Mapping[str, Any]) -> list[Histogram] | None:
-    """The distances of each place in the content of the model.json `path`, None if it has none; ModelError as above."""
-    try:
-        distances = _distances(description)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ModelError(f"{path}: 'distances' holds no numbers of frames; train the model again") from error
-    return None if distances is None else [distances[place] for place in description["places"]]
-
-
-def _distances(description: Mapping[str, Any]) -> dict[str, Histogram] | None:
-    known = description["distances"]
-    return known and {place: {int(b): _count(n) for b, n in known[place].items()} for place in description["places"]}
-
-
-def _count(value: Any) -> int:
-    if type(value) is not int or value < 0:
-        raise ValueError(value)
-    return value

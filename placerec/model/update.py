@@ -21,20 +21,12 @@ from placerec.lm.counts import add_counts
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.trie import Vocabulary
 from placerec.model.corpus import Corpus, holds_sentences, read_corpus
-from placerec.model.load import read_description
-from placerec.model.record import Record, add_record, read_record, take_away
-from placerec.model.train import (
-    MODEL_JSON,
-    OWNED,
-    ModelOptions,
-    PlaceFiles,
-    begin_model,
-    check_options,
-    write_model_json,
-    write_place,
-)
-from placerec.words import format_sentences, parse_selection, read_vocabulary
-from placerec.words.folder import VOCABULARY, check_dictionary, stream_files
+from placerec.model.folder import MODEL_JSON, OWNED, ModelDescription, ModelFolder
+from placerec.model.options import ModelOptions
+from placerec.model.record import Record, add_record, take_away
+from placerec.model.train import begin_model, write_place
+from placerec.words import format_sentences
+from placerec.words.folder import check_dictionary, stream_files
 from placerec.words.stream import stream_name
 
 # The sentences of a place, as in its file.
@@ -46,7 +38,7 @@ log = logging.getLogger(__name__)
 class _Model:
     """A MODEL/ folder as far as learning goes on from it."""
 
-    path: Path
+    folder: ModelFolder
     options: ModelOptions
     vocabulary: Sequence[str] = field(repr=False)
     record: Record = field(repr=False)
@@ -82,18 +74,20 @@ def update(
         record = _without(old, new.record) if forget else _with(old, new.record, tokens)
         former = set(old.record.places)
         changed = [place for place in record.places if new.sentences.get(place) or place not in former]
-        with whole_folder(path, OWNED) as folder:
+        with whole_folder(path, OWNED) as made:
+            folder = ModelFolder(made)
             begin_model(folder, old.vocabulary, old.options)
             for place in set(record.places) - set(changed):
-                for source, target in zip(PlaceFiles.of(path, place), PlaceFiles.of(folder, place), strict=True):
+                for source, target in zip(old.folder.place(place), folder.place(place), strict=True):
                     shutil.copyfile(source, target)
             for done, place in enumerate(changed, start=1):
                 lines, counts = _forgotten(old, new, place) if forget else _learned(old, new, place)
-                write_text(PlaceFiles.of(folder, place).sentences, "".join(lines))
+                write_text(folder.place(place).sentences, "".join(lines))
                 write_place(folder, place, counts, old.vocabulary, old.options)
                 if progress:
                     progress(done, len(changed))
-            write_model_json(folder, record.places, old.vocabulary, old.options, record)
+            words = len(old.vocabulary)
+            folder.write(ModelDescription.of(folder, record.places, words, old.options, record))
     if old.calibrated:
         log.warning("%s: the calibration was of the former model, and is dropped; calibrate again", path)
     verb, names = "forgotten" if forget else "learned", ", ".join(new.record.names)
@@ -102,20 +96,13 @@ def update(
 
 def _read_model(path: Path) -> _Model:
     """What a MODEL/ folder says of itself, if its visits can be told apart and none of its files is missing."""
-    description = read_description(path / MODEL_JSON)
-    record = read_record(path / MODEL_JSON, description)
-    for file in (file for place in record.places for file in PlaceFiles.of(path, place)):
+    folder = ModelFolder(path)
+    description = folder.read()
+    record = description.record
+    for file in (file for place in record.places for file in folder.place(place)):
         if not file.is_file():
             raise ModelError(f"{file}: missing, though {MODEL_JSON} names visits to its place; train the model again")
-    keys = ("order", "smoothing", "delta", "min_count", "markers", "select")
-    try:
-        order, method, delta, min_count, markers, select = (description[key] for key in keys)
-        options = ModelOptions(order, method, delta, tuple(min_count), markers, parse_selection(select))
-        check_options(options)
-    except (KeyError, TypeError) as error:
-        raise ModelError(f"{path / MODEL_JSON}: its options make no model; train the model again") from error
-    vocabulary = read_vocabulary(path / VOCABULARY)
-    return _Model(path, options, vocabulary, record, description.get("calibration") is not None)
+    return _Model(folder, description.options, folder.words(), record, description.is_calibrated)
 
 
 def _read_visits(tokens: Sequence[Path | str], old: _Model) -> Corpus:
@@ -123,11 +110,11 @@ def _read_visits(tokens: Sequence[Path | str], old: _Model) -> Corpus:
     streams = old.record.transitions is not None
     if streams == holds_sentences(tokens):
         kind = "token streams" if streams else "a folder of sentences"
-        raise StreamError(f"{tokens[0]}: is not what {old.path} was trained on; give {kind}")
+        raise StreamError(f"{tokens[0]}: is not what {old.folder} was trained on; give {kind}")
     if streams:
-        check_dictionary(stream_files(tokens), old.record.dictionary, old.path)
-    remedy = f"tokenize as {old.path} was, or train a model on all words"
-    return read_corpus(tokens, selection=old.options.select, vocabulary=old.path / VOCABULARY, remedy=remedy)
+        check_dictionary(stream_files(tokens), old.record.dictionary, old.folder.path)
+    remedy = f"tokenize as {old.folder} was, or train a model on all words"
+    return read_corpus(tokens, selection=old.options.select, vocabulary=old.folder.vocabulary, remedy=remedy)
 
 
 def _knows(old: _Model, new: Corpus) -> bool:
@@ -136,7 +123,7 @@ def _knows(old: _Model, new: Corpus) -> bool:
     if not new.record.names or any(visits.get(s.name) != s.visits for s in new.record.sequences):
         return False
     for place in new.record.places:
-        text = read_text(PlaceFiles.of(old.path, place).sentences, ModelError)
+        text = read_text(old.folder.place(place).sentences, ModelError)
         blocks = _blocks(old.record, place, text.splitlines(keepends=True))
         its = _blocks(new.record, place, _lines(new, place))
         if any(blocks[name] != block for name, block in its.items()):
@@ -152,7 +139,9 @@ def _with(old: _Model, new: Record, tokens: Sequence[Path | str]) -> Record:
     both = ((stream_name(path), with_parent(stream_name(path), path)) for path in streams)
     for name in chain(new.names, *both):
         if name in learned:
-            raise ModelError(f"{name}: {old.path} has learned a sequence of this name; rename the file of another one")
+            raise ModelError(
+                f"{name}: {old.folder} has learned a sequence of this name; rename the file of another one"
+            )
     if not new.places:
         raise ModelError("no labelled frame found: label the frames (places.lst, or one folder per place) to learn")
     check_twins((p, s.name) for s in (*old.record.sequences, *new.sequences) for p in s.visits)
@@ -164,12 +153,16 @@ def _without(old: _Model, gone: Record) -> Record:
     learned = {sequence.name: sequence.visits for sequence in old.record.sequences}
     for sequence in gone.sequences:
         if sequence.name not in learned:
-            raise ModelError(f"{sequence.name}: {old.path} never learned a sequence of this name; see its {MODEL_JSON}")
+            raise ModelError(
+                f"{sequence.name}: {old.folder} never learned a sequence of this name; see its {MODEL_JSON}"
+            )
         if sequence.visits != learned[sequence.name]:
             raise _not_as_learned(sequence.name)
     record = take_away(old.record, gone)
     if not record.places:
-        raise ModelError(f"{old.path}: has learned nothing else, and a model has one place at least; remove the folder")
+        raise ModelError(
+            f"{old.folder}: has learned nothing else, and a model has one place at least; remove the folder"
+        )
     return record
 
 
@@ -199,7 +192,7 @@ def _forgotten(old: _Model, gone: Corpus, place: str) -> tuple[Lines, NgramCount
     try:
         return [line for block in blocks.values() for line in block], subtract_counts(former_counts, counts)
     except LanguageModelError as error:
-        raise _edited(PlaceFiles.of(old.path, place).counts, str(error)) from error
+        raise _edited(old.folder.place(place).counts, str(error)) from error
 
 
 def _blocks(record: Record, place: str, lines: Lines) -> dict[str, Lines]:
@@ -210,7 +203,7 @@ def _blocks(record: Record, place: str, lines: Lines) -> dict[str, Lines]:
 
 def _read_place(model: _Model, place: str, vocabulary: Vocabulary) -> tuple[Lines, NgramCounts]:
     """The sentences and counts of a place; ModelError if they do not agree, with each other and with model.json."""
-    files = PlaceFiles.of(model.path, place)
+    files = model.folder.place(place)
     lines = read_text(files.sentences, ModelError).splitlines(keepends=True)
     counts = read_counts(files.counts, vocabulary, model.options.order)
     visits = sum(sequence.visits.get(place, 0) for sequence in model.record.sequences)

@@ -18,7 +18,6 @@ from placerec.lm import SMOOTHINGS, count_ngrams, format_counts, read_arpa
 from placerec.lm.external import kenlm_scorer
 from placerec.model import ModelOptions, estimate_place, parse_min_count, train_model
 from placerec.model.record import LearnedSequence, Record
-from placerec.model.train import ngram_count_command
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, sentences_per_place
 
@@ -129,11 +128,11 @@ def test_model_json_tells_all_options(tmp_path: Path) -> None:
 )
 def test_the_srilm_command_of_a_model(options: ModelOptions, command: str) -> None:
     expected = f"ngram-count -text sentences/hall.txt -vocab vocab.txt {command} -lm hall.arpa"
-    assert ngram_count_command("hall", options) == expected
+    assert options.ngram_count_command("hall") == expected
 
 
 def test_srilm_has_no_interpolated_lidstone() -> None:
-    assert ngram_count_command("hall", ModelOptions(smoothing="lidstone")) is None
+    assert ModelOptions(smoothing="lidstone").ngram_count_command("hall") is None
 
 
 def test_nothing_of_a_former_model_remains(tmp_path: Path) -> None:

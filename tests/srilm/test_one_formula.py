@@ -9,7 +9,6 @@ import pytest
 
 from placerec.lm import SMOOTHINGS
 from placerec.model import ModelOptions, train_model
-from placerec.model.train import ngram_count_command
 from placerec.srilm.ngram_count import ngram_count
 from placerec.srilm.streams import Streams
 
@@ -28,7 +27,7 @@ def test_the_command_makes_the_same_lines(
 ) -> None:
     options = ModelOptions(order=order, smoothing=name, markers=markers, min_count=(1, 1, 2))
     train_model({"hall": visits()}, [f"w{i:02d}" for i in range(60)], tmp_path / "model", options=options)
-    command = ngram_count_command("hall", options)
+    command = options.ngram_count_command("hall")
     if command is None:
         assert name == "lidstone"
         return

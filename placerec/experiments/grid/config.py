@@ -33,7 +33,7 @@ from placerec.files import read_text
 from placerec.hohmm import PER
 from placerec.lm import SMOOTHINGS
 from placerec.model.decoding import NAMED, STAY
-from placerec.model.train import MAX_ORDER
+from placerec.model.options import MAX_ORDER
 from placerec.vision.dictionary import UNITS
 from placerec.words import parse_selection
 

@@ -1,0 +1,366 @@
+"""The MODEL/ folder: the names of its files, and what model.json holds.
+
+MODEL/PLACE.arpa             the language models: all that `decode` computes with
+MODEL/model.json             places, options, what is recorded of the training, the equivalent `ngram-count` commands
+MODEL/vocab.txt              all words
+MODEL/sentences/PLACE.txt    what was counted
+MODEL/counts/PLACE.counts    the counts
+MODEL/nonevents.txt          without markers: what the `ngram-count` commands need to leave </s> out
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from placerec.arrays import Ints
+from placerec.errors import ModelError, PlacerecError
+from placerec.files import read_text, write_text
+from placerec.frames.places import check_place
+from placerec.hohmm import Calibration
+from placerec.hohmm.distances import Histogram
+from placerec.lm import BackoffModel, read_arpa
+from placerec.model.options import ModelOptions
+from placerec.model.record import LearnedSequence, Record
+from placerec.version import __version__
+from placerec.words import Selection, Sentences, parse_selection, read_sentences, read_vocabulary
+from placerec.words.folder import VOCABULARY
+
+FORMAT = "placerec model 1"
+MODEL_JSON = "model.json"
+OWNED = ("*.arpa", MODEL_JSON, VOCABULARY, "nonevents.txt", "sentences", "counts")
+_RETRAIN, _RECALIBRATE = "train the model again", "run `placerec calibrate` again"
+
+
+class PlaceFiles(NamedTuple):
+    """The files of one place in a MODEL/ folder."""
+
+    arpa: Path
+    sentences: Path
+    counts: Path
+
+
+@dataclass(frozen=True)
+class ModelFolder:
+    """A MODEL/ folder, which need not be there yet."""
+
+    path: Path
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    @property
+    def json(self) -> Path:
+        """The file that describes the model."""
+        return self.path / MODEL_JSON
+
+    @property
+    def vocabulary(self) -> Path:
+        """The file of all words."""
+        return self.path / VOCABULARY
+
+    @property
+    def nonevents(self) -> Path:
+        """The file of words that are no events, for `ngram-count`."""
+        return self.path / "nonevents.txt"
+
+    def place(self, place: str) -> PlaceFiles:
+        """The files of a place."""
+        return PlaceFiles(
+            self.path / f"{place}.arpa",
+            self.path / "sentences" / f"{place}.txt",
+            self.path / "counts" / f"{place}.counts",
+        )
+
+    def check(self) -> None:
+        """Raise ModelError, with the remedy, if there is no such folder."""
+        if self.path.exists() and not self.path.is_dir():
+            raise ModelError(f"{self.path}: is a file, and the folder of a model is expected; name the folder")
+        if not self.path.exists():
+            raise ModelError(f"{self}: no such model folder; `placerec train-lm TOKENS... -o {self}` makes one")
+
+    def read(self) -> "ModelDescription":
+        """What model.json says; ModelError unless everything that decoding uses is there and usable."""
+        return ModelDescription.read(self.json)
+
+    def write(self, description: "ModelDescription") -> None:
+        """Write model.json."""
+        write_text(self.json, _format(dict(description.values), "") + "\n")
+
+    def words(self) -> tuple[str, ...]:
+        """The words of vocab.txt; StreamError for a file that is missing or broken."""
+        return read_vocabulary(self.vocabulary)
+
+    def sentences(self, places: Sequence[str]) -> dict[str, Sentences]:
+        """The sentences of each place; StreamError for a file that is missing or broken."""
+        return {place: read_sentences(self.place(place).sentences) for place in places}
+
+
+@dataclass(frozen=True)
+class PlaceModels:
+    """The language models of a MODEL/ folder, one per place in order, and what model.json says of them."""
+
+    folder: ModelFolder
+    models: Mapping[str, BackoffModel] = field(repr=False)
+    description: "ModelDescription" = field(repr=False)
+
+    @property
+    def selection(self) -> Selection:
+        """Which words of a stream were counted, and are decoded."""
+        return self.description.selection
+
+
+def load_model(path: Path | str) -> PlaceModels:
+    """Read a MODEL/ folder; ModelError or LanguageModelError, naming the file, for anything missing or broken."""
+    folder = ModelFolder(Path(path))
+    folder.check()
+    description = folder.read()
+    models = {}
+    for place in description.places:
+        arpa = folder.place(place).arpa
+        if not arpa.exists():
+            raise ModelError(f"{arpa}: missing, though {MODEL_JSON} lists the place {place!r}; {_RETRAIN}")
+        models[place] = read_arpa(arpa)
+    return PlaceModels(folder, models, description)
+
+
+@dataclass(frozen=True)
+class ModelDescription:
+    """What model.json `path` says, as plain `values`; what is read from them raises ModelError if it is not usable."""
+
+    path: Path
+    values: Mapping[str, Any] = field(repr=False)
+
+    @classmethod
+    def read(cls, path: Path) -> "ModelDescription":
+        """Read model.json; ModelError unless places, selection and dictionary are there and usable."""
+        if not path.exists():
+            raise ModelError(f"{path}: missing, so {path.parent} is no model of train-lm; {_RETRAIN}")
+        try:
+            values = json.loads(read_text(path, ModelError))
+        except ValueError as error:
+            raise ModelError(f"{path}: is no JSON ({error}); {_RETRAIN}") from error
+        if not isinstance(values, dict) or values.get("format") != FORMAT:
+            raise ModelError(f"{path}: is not of the format {FORMAT!r}; {_RETRAIN}")
+        places, dictionary = values.get("places"), values.get("dictionary", 0)
+        if not isinstance(places, list) or not places or len(set(map(str, places))) < len(places):
+            raise ModelError(f"{path}: 'places' must list the names of places, each once; {_RETRAIN}")
+        for place in places:
+            if reason := check_place(str(place)):
+                raise ModelError(f"{path}: place {place!r} {reason}; {_RETRAIN}")
+        if dictionary is not None and not isinstance(dictionary, str):
+            raise ModelError(f"{path}: 'dictionary' must be a fingerprint or null; {_RETRAIN}")
+        try:
+            parse_selection(str(values.get("select")))
+        except PlacerecError as error:
+            raise ModelError(f"{path}: {error}; {_RETRAIN}") from error
+        return cls(path, values)
+
+    @classmethod
+    def of(
+        cls, folder: ModelFolder, places: Sequence[str], words: int, options: ModelOptions, record: Record
+    ) -> "ModelDescription":
+        """What model.json says of a new model of `words` words, which is not calibrated."""
+        return cls(
+            folder.json,
+            {
+                "format": FORMAT,
+                "version": __version__,
+                "places": list(places),
+                "order": options.order,
+                "smoothing": options.smoothing,
+                "delta": options.delta_used,
+                "min_count": list(options.min_count),
+                "markers": options.markers,
+                "select": str(options.select),
+                "vocabulary": words,
+                **_describe_record(record),
+                "calibration": None,
+                "ngram_count": {place: options.ngram_count_command(place) for place in places},
+            },
+        )
+
+    @property
+    def places(self) -> list[str]:
+        """The places, in the order of the beliefs' columns."""
+        places: list[str] = self.values["places"]
+        return places
+
+    @property
+    def selection(self) -> Selection:
+        """Which words of a stream were counted."""
+        return parse_selection(self.values["select"])
+
+    @property
+    def dictionary(self) -> str | None:
+        """The fingerprint of the dictionary that made the training words, None if unknown."""
+        fingerprint: str | None = self.values["dictionary"]
+        return fingerprint
+
+    @property
+    def added_count(self) -> float:
+        """What the smoothing adds to every count; 1 for a smoothing that adds nothing."""
+        return float(self.values["delta"]) if str(self.values["smoothing"]).startswith("lidstone") else 1.0
+
+    @property
+    def trained_on(self) -> frozenset[str]:
+        """The names of the training sequences."""
+        return frozenset(one["name"] if isinstance(one, Mapping) else one for one in self.values.get("sequences", ()))
+
+    @property
+    def options(self) -> ModelOptions:
+        """How the models were made."""
+        keys = ("order", "smoothing", "delta", "min_count", "markers", "select")
+        try:
+            order, method, delta, min_count, markers, select = (self.values[key] for key in keys)
+            options = ModelOptions(order, method, delta, tuple(min_count), markers, parse_selection(select))
+            options.check()
+        except (KeyError, TypeError) as error:
+            raise ModelError(f"{self.path}: its options make no model; {_RETRAIN}") from error
+        return options
+
+    @property
+    def record(self) -> Record:
+        """What is recorded of the training sequences."""
+        try:
+            return _read_record(self.values)
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            raise ModelError(
+                f"{self.path}: does not say which visits were learned, as an older placerec or an editor leaves it; "
+                f"{_RETRAIN}"
+            ) from error
+
+    @property
+    def distances(self) -> list[Histogram] | None:
+        """How far the training frames of each place lay from their words, None where that is unknown."""
+        try:
+            distances = _read_distances(self.values)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise ModelError(f"{self.path}: 'distances' holds no numbers of frames; {_RETRAIN}") from error
+        return None if distances is None else [distances[place] for place in self.places]
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether there is a calibration, usable or not."""
+        return self.values.get("calibration") is not None
+
+    @property
+    def calibration(self) -> tuple[Calibration, Mapping[str, Any]] | None:
+        """The calibration and the decoding that it was fitted for, None without one."""
+        stored = self._stored()
+        if stored is None:
+            return None
+        try:
+            calibration = Calibration.from_json(stored)
+        except ModelError as error:
+            raise ModelError(f"{self.path}: {error}") from error
+        options = stored.get("options")
+        return calibration, options if isinstance(options, Mapping) else {}
+
+    @property
+    def measured_distances(self) -> tuple[float, float] | None:
+        """Shift and variance of log2 distance, as the calibration measured them; None if it did not."""
+        stored = (self._stored() or {}).get("distances")
+        if stored is None:
+            return None
+        try:
+            shift, variance = float(stored["shift"]), float(stored["variance"])
+        except (KeyError, TypeError, ValueError):
+            shift = variance = math.nan
+        if not (math.isfinite(shift) and 0 <= variance < math.inf):
+            raise ModelError(f"{self.path}: the calibration's distances are no shift and variance; {_RECALIBRATE}")
+        return shift, variance
+
+    def calibrated(
+        self,
+        calibration: Calibration,
+        *,
+        decoding: Mapping[str, Any],
+        distances: tuple[float, float] | None,
+        sequences: Sequence[str],
+    ) -> "ModelDescription":
+        """The description with a calibration in place of the one before.
+
+        `decoding`: what it was fitted for. `distances`: shift and variance of log2 distance. `sequences`: their names.
+        """
+        entry = {
+            **calibration.to_json(),
+            "distances": distances and dict(zip(("shift", "variance"), distances, strict=True)),
+            "options": decoding,
+            "sequences": list(sequences),
+        }
+        return ModelDescription(self.path, {**self.values, "calibration": entry})
+
+    def _stored(self) -> Mapping[str, Any] | None:
+        stored = self.values.get("calibration")
+        if stored is not None and not isinstance(stored, Mapping):
+            raise ModelError(f"{self.path}: 'calibration' is none; {_RECALIBRATE}")
+        return stored
+
+
+def _format(value: Any, indent: str) -> str:
+    """JSON text in which what holds nothing but whole numbers is on one line, the rest as `json` indents it."""
+    inner = list(value.values()) if isinstance(value, dict) else value
+    if not isinstance(value, dict | list) or all(isinstance(item, int) for item in inner):
+        return json.dumps(value, ensure_ascii=False)
+    texts = [_format(item, indent + "  ") for item in inner]
+    if isinstance(value, dict):
+        texts = [f"{json.dumps(key, ensure_ascii=False)}: {text}" for key, text in zip(value, texts, strict=True)]
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    return f"{opening}\n" + ",\n".join(f"{indent}  {text}" for text in texts) + f"\n{indent}{closing}"
+
+
+def _describe_record(record: Record) -> dict[str, Any]:
+    transitions, distances = None, record.distances
+    if record.transitions is not None and record.triples is not None:
+        triples = [[*route, int(record.triples[tuple(route)])] for route in np.argwhere(record.triples).tolist()]
+        transitions = {"counts": record.transitions.tolist(), "triples": triples}
+    return {
+        "sequences": [{"name": s.name, "visits": dict(s.visits)} for s in record.sequences],
+        "dictionary": record.dictionary,
+        "transitions": transitions,
+        "distances": distances
+        and {place: {str(b): count for b, count in histogram.items()} for place, histogram in distances.items()},
+    }
+
+
+def _read_record(values: Mapping[str, Any]) -> Record:
+    learned = tuple(
+        LearnedSequence(str(item["name"]), {place: _count(n) for place, n in item["visits"].items()})
+        for item in values["sequences"]
+    )
+    places, steps = values["places"], values["transitions"]
+    distances = _read_distances(values)
+    if Record(learned).places != places or (steps is None) != (distances is None):
+        raise ValueError(places)
+    transitions = steps and np.array([[*map(_count, row)] for row in steps["counts"]], np.int64)
+    triples = steps and _read_triples(steps["triples"], len(places))
+    record = Record(learned, values["dictionary"], transitions, distances, triples)
+    if transitions is not None and transitions.shape != (len(places), len(places)):
+        raise ValueError(transitions.shape)
+    return record
+
+
+def _read_triples(listed: Any, C: int) -> Ints:
+    triples = np.zeros((C, C, C), np.int64)
+    for entry in listed:
+        i, j, k, count = map(_count, entry)
+        if max(i, j, k) >= C or j in (i, k):
+            raise ValueError(entry)
+        triples[i, j, k] = count
+    return triples
+
+
+def _read_distances(values: Mapping[str, Any]) -> dict[str, Histogram] | None:
+    known = values["distances"]
+    return known and {place: {int(b): _count(n) for b, n in known[place].items()} for place in values["places"]}
+
+
+def _count(value: Any) -> int:
+    if type(value) is not int or value < 0:
+        raise ValueError(value)
+    return value

@@ -1,0 +1,76 @@
+"""How language models of places are made, and what says so: options, signatures, the equivalent SRILM commands."""
+
+from dataclasses import dataclass
+
+from placerec.errors import ModelError
+from placerec.lm import smoothing
+from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
+from placerec.version import __version__
+from placerec.words import Selection
+
+MAX_ORDER = 9
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """How language models are made; every name is that of the command line.
+
+    `order`: n-gram order (1: the classical HMM). `delta`: see `placerec.lm.smoothing`; None for its default.
+    `min_count`: per order, the last repeats. `markers`: whether `<s>` and `</s>` are counted.
+    """
+
+    order: int = 2
+    smoothing: str = "witten-bell"
+    delta: float | None = None
+    min_count: tuple[int, ...] = (1,)
+    markers: bool = False
+    select: Selection = Selection()
+
+    def check(self) -> None:
+        """Raise ModelError or LanguageModelError for an option that no model can be made with."""
+        if not 1 <= self.order <= MAX_ORDER:
+            raise ModelError(f"order {self.order} is not between 1 and {MAX_ORDER}")
+        if not self.min_count or min(self.min_count) < 1:
+            raise ModelError(f"minimum counts {self.min_count} are not understood; give numbers above 0, one at least")
+        smoothing(self.smoothing, self.delta)
+
+    @property
+    def delta_used(self) -> float:
+        """`delta`, or the default of the smoothing."""
+        return default_delta(self.smoothing) if self.delta is None else self.delta
+
+    def signature(self, place: str, words: int) -> str:
+        """What made the model of a place over `words` words: the first line of its ARPA file."""
+        delta = f" delta={self.delta_used:g}" if self.smoothing.startswith(("lidstone", "absolute")) else ""
+        return (
+            f"placerec {__version__} place={place} order={self.order} smoothing={self.smoothing}{delta}"
+            f" select={self.select} min-count={','.join(map(str, self.min_count))}"
+            f" markers={'yes' if self.markers else 'no'} vocab={words}"
+        )
+
+    def ngram_count_command(self, place: str) -> str | None:
+        """The SRILM command, run in MODEL/, that makes the place's model of its sentences; None where there is none."""
+        method = SRILM_OPTIONS[self.smoothing]
+        if method is None:
+            return None
+        minima = [self.min_count[min(n, len(self.min_count)) - 1] for n in range(1, self.order + 1)]
+        return " ".join(
+            [
+                f"ngram-count -text sentences/{place}.txt -vocab vocab.txt",
+                *([] if self.markers else ["-nonevents nonevents.txt -no-sos -no-eos"]),
+                f"-order {self.order}",
+                *(f"-gt{n}min {minimum}" for n, minimum in enumerate(minima, start=1)),
+                method.format(delta=self.delta_used),
+                f"-lm {place}.arpa",
+            ]
+        )
+
+
+def parse_min_count(text: str) -> tuple[int, ...]:
+    """Minimum counts per order from `N[,N...]` or `srilm` (1,1,2: what ngram-count does); ModelError otherwise."""
+    if text == "srilm":
+        return (1, 1, 2)
+    parts = text.split(",")
+    if not all(part.isascii() and part.isdigit() and int(part) > 0 for part in parts):
+        raise ModelError(f"minimum count {text!r} is not understood; give numbers above 0 as in 1,1,2, or srilm")
+    return tuple(int(part) for part in parts)
