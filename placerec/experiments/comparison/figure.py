@@ -49,12 +49,12 @@ def plot_comparison(found: Comparison, path: Path | str) -> None:
 def _points(axes: "Axes", scores: list[MethodScore]) -> None:
     colours = place_colours(_KINDS)
     for kind, colour in zip(_KINDS, map(tuple, colours.tolist()), strict=True):
-        its = [s for s in scores if _kind(s) == kind]
-        if its:
-            accuracy = np.array([s.accuracy for s in its])
-            ends = np.array([[s.accuracy_low for s in its], [s.accuracy_high for s in its]])
+        own = [s for s in scores if _kind(s) == kind]
+        if own:
+            accuracy = np.array([s.accuracy for s in own])
+            ends = np.array([[s.accuracy_low for s in own], [s.accuracy_high for s in own]])
             axes.errorbar(
-                [max(s.microseconds_per_frame, _LEAST) for s in its],
+                [max(s.microseconds_per_frame, _LEAST) for s in own],
                 accuracy,
                 yerr=np.abs(ends - accuracy),
                 fmt="o",

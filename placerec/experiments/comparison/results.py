@@ -46,7 +46,7 @@ def judge(runs: Mapping[str, MethodRun], cost: FrontEndCost, seed: int) -> Compa
     evaluations = {name: evaluate(run.beliefs) for name, run in runs.items()}
     counted = {name: count_blocks(run.beliefs) for name, run in runs.items()}
     blocks, _ = next(iter(counted.values()))
-    right = {name: its for name, (_, its) in counted.items()}
+    right = {name: frames for name, (_, frames) in counted.items()}
     drawn = draw(len(blocks.frames), seed)
     scores = tuple(
         MethodScore(

@@ -30,7 +30,7 @@ from placerec.words.folder import read_streams
 
 
 class GridCell(NamedTuple):
-    """One way to make models and to filter with them; the selection is that of its `CellJob`."""
+    """How models are made of selected words, and how the filter uses them."""
 
     smoothing: str
     order: int
@@ -41,7 +41,7 @@ class GridCell(NamedTuple):
 class CellJob:
     """The cells of one selection on one fold: `train` and `test` are token stream files.
 
-    The name of `kept`, where results are kept, says what streams and selection they are of.
+    `kept`: the file where results are kept, whose name is a digest of the streams and the selection.
     """
 
     train: tuple[Path, ...]
@@ -53,7 +53,7 @@ class CellJob:
     kept: Path
 
     def name(self, cell: GridCell) -> str:
-        """What a cell is kept as: all that it depends on beside the job."""
+        """The key of a cell's results in `kept`: all that they depend on beside streams and selection."""
         filter_ = ("learned",) if cell.transition == "learned" else (cell.transition, f"{self.stay!r}", self.per)
         return " ".join((cell.smoothing, str(cell.order), *filter_))
 
@@ -89,7 +89,7 @@ def believe_cell(job: CellJob, cell: GridCell) -> list[Beliefs]:
 
 @dataclass(frozen=True)
 class _Streams:
-    """What a job's files hold; counts of n-grams per place, with selection, and of words alone without."""
+    """The streams of a job, and per place the counts of n-grams of selected words, and of all words alone."""
 
     corpus: Corpus
     training: list[WordStream]

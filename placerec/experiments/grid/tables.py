@@ -29,7 +29,9 @@ def runs_table(rows: Iterable[Row]) -> Table:
     for row in rows:
         runs.setdefault(row.size, {})[row.seed, row.fold] = row.same_word_run
     paper = {size: f"{run:g}" for size, run in PAPER_RUNS.items()}
-    lines = [(str(size), f"{np.mean([*its.values()]):.2f}", paper.get(size, "")) for size, its in sorted(runs.items())]
+    lines = [
+        (str(size), f"{np.mean([*values.values()]):.2f}", paper.get(size, "")) for size, values in sorted(runs.items())
+    ]
     return ("S", "same-word run", "in the paper, on COLD"), lines
 
 
