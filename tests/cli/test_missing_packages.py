@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from without import run_without
+from helpers.missing_packages import run_without
 
 PICTURE = "placerec: a picture needs the package matplotlib, which is not installed: pip install 'placerec[plot]'\n"
 KNN = (

@@ -1,13 +1,13 @@
 """Pictures: written whole, the same bytes for the same numbers, and honest about what they leave out."""
 
 import logging
-import re
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.pictures import drawn_texts
 from helpers.small_world import beliefs_of
 
 from placerec.errors import MissingExtraError, OutputError
@@ -17,6 +17,8 @@ from placerec.figures.canvas import figure_file, place_colours
 from placerec.figures.evaluation import chosen
 from placerec.figures.panels import belief_strip, confusion_panel
 from placerec.hohmm.beliefs import Beliefs
+
+matplotlib = pytest.importorskip("matplotlib")
 
 PLACES = ("corridor", "kitchen", "a$b$c")
 
@@ -33,17 +35,11 @@ def recording(name: str, frames: int = 60, wrong: int = 5, places: tuple[str, ..
     return beliefs_of(name, places, labels[:frames], decided, belief, np.arange(frames) / 5)
 
 
-def drawn_text(path: Path) -> str:
-    """The texts of an SVG: matplotlib leaves each beside its outlines, as a comment."""
-    return "\n".join(re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8")))
-
-
 MAGIC = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<?xml", "pdf": b"%PDF"}
 
 
 @pytest.mark.parametrize(("suffix", "magic"), MAGIC.items())
 def test_the_same_numbers_give_the_same_bytes(tmp_path: Path, suffix: str, magic: bytes) -> None:
-    matplotlib = pytest.importorskip("matplotlib")
     beliefs = [recording("seq1"), recording("seq2", 40)]
     for name in ("a", "b"):
         plot_evaluation(beliefs, evaluate(beliefs), tmp_path / f"{name}.{suffix}")
@@ -55,7 +51,6 @@ def test_the_same_numbers_give_the_same_bytes(tmp_path: Path, suffix: str, magic
 
 
 def test_the_users_matplotlib_settings_change_nothing_and_stay(tmp_path: Path) -> None:
-    matplotlib = pytest.importorskip("matplotlib")
     beliefs = [recording("seq1")]
     plot_evaluation(beliefs, evaluate(beliefs), tmp_path / "a.png")
     with matplotlib.rc_context({"font.size": 25, "text.color": "red", "xtick.color": "red"}):
@@ -65,12 +60,11 @@ def test_the_users_matplotlib_settings_change_nothing_and_stay(tmp_path: Path) -
 
 
 def test_the_picture_says_what_it_shows(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     # 60 frames, 20 of each place; 4 of the corridor have no label, 5 others of it are decided as kitchen.
     beliefs = [recording("seq1")]
     result = evaluate(beliefs)
     plot_evaluation(beliefs, result, tmp_path / "a.svg")
-    text = drawn_text(tmp_path / "a.svg")
+    text = "\n".join(drawn_texts(tmp_path / "a.svg"))
     assert f"Accuracy {100 * 51 / 56:.1f} %   (majority class, always “kitchen”: {100 * 20 / 56:.1f} %)" in text
     for needed in ("seq1   91.1 % right", "a$b$c", "true place", "decided place", "belief", "wrong", "no label"):
         assert needed in text, needed
@@ -79,7 +73,6 @@ def test_the_picture_says_what_it_shows(tmp_path: Path) -> None:
 
 
 def test_what_is_unknown_is_drawn_and_judged(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     made = recording("seq1")
     # The kitchen is a place without a column, and is noticed; its column goes to another place.
     places = ("corridor", "garage", "a$b$c")
@@ -89,7 +82,7 @@ def test_what_is_unknown_is_drawn_and_judged(tmp_path: Path) -> None:
     beliefs = [replace(made, places=places, best=best, unknown=np.where(new, 0.75, 0.0))]
     result = evaluate(beliefs)
     plot_evaluation(beliefs, result, tmp_path / "a.svg")
-    text = drawn_text(tmp_path / "a.svg")
+    text = "\n".join(drawn_texts(tmp_path / "a.svg"))
     for needed in ("New places: AUROC 1.000", "Reliability: ECE", "unknown", "seq1   91.1 % right"):
         assert needed in text, needed
     with figure_file(tmp_path / "a.png", 8, 3) as figure:
@@ -104,15 +97,15 @@ def test_what_is_unknown_is_drawn_and_judged(tmp_path: Path) -> None:
 
 
 def test_without_unknown_the_gain_of_withholding_is_drawn(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     beliefs = [recording("seq1"), recording("seq2")]
     result = evaluate(beliefs)
     plot_evaluation(beliefs, result, tmp_path / "a.svg")
-    assert f"Only the surest answered: area {result.risk_coverage.area:.3f}" in drawn_text(tmp_path / "a.svg")
+    assert f"Only the surest answered: area {result.risk_coverage.area:.3f}" in "\n".join(
+        drawn_texts(tmp_path / "a.svg")
+    )
 
 
 def test_of_many_sequences_the_best_and_the_worst_are_drawn(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     beliefs = [recording(f"seq{number}", wrong=(number * 7) % 23 % 10) for number in range(23)]
     beliefs.append(recording("hopeless", wrong=40))
     result = evaluate(beliefs)
@@ -123,8 +116,8 @@ def test_of_many_sequences_the_best_and_the_worst_are_drawn(tmp_path: Path) -> N
     drawn = [result.sequences[item.name].accuracy or 0 for item in shown]
     assert (min(drawn), max(drawn)) == (min(accuracies), max(accuracies))
     plot_evaluation(beliefs, result, tmp_path / "a.svg")
-    assert "20 of 24 sequences: the best, the worst and evenly many between by accuracy." in drawn_text(
-        tmp_path / "a.svg"
+    assert "20 of 24 sequences: the best, the worst and evenly many between by accuracy." in "\n".join(
+        drawn_texts(tmp_path / "a.svg")
     )
 
 
@@ -137,25 +130,22 @@ def test_sequences_without_a_label_give_way_to_others() -> None:
 
 
 def test_a_long_recording_is_thinned_and_says_so(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     beliefs = [recording("long", 20_000)]
     plot_evaluation(beliefs, evaluate(beliefs), tmp_path / "a.svg")
-    assert "1500 of 20000 frames are drawn" in drawn_text(tmp_path / "a.svg")
+    assert "1500 of 20000 frames are drawn" in "\n".join(drawn_texts(tmp_path / "a.svg"))
     assert (tmp_path / "a.svg").stat().st_size < 500_000
 
 
 def test_odd_recordings_are_drawn(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     many = tuple(f"place {number}" for number in range(45))
     beliefs = [recording("empty", 0, 0), recording("one", 1, 0), recording("many", 90, 3, many)]
     plot_evaluation(beliefs, evaluate([*beliefs]), tmp_path / "a.svg")
-    text = drawn_text(tmp_path / "a.svg")
+    text = "\n".join(drawn_texts(tmp_path / "a.svg"))
     assert "no frames" in text
     assert "empty   no frame has a label" in text
 
 
 def test_a_missing_letter_is_logged_not_warned(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    pytest.importorskip("matplotlib")
     beliefs = [recording("seq1", places=("廊下", "kitchen"))]
     with caplog.at_level(logging.WARNING, "placerec"):
         plot_evaluation(beliefs, evaluate(beliefs), tmp_path / "a.png")
@@ -166,7 +156,6 @@ def test_a_missing_letter_is_logged_not_warned(tmp_path: Path, caplog: pytest.Lo
 
 
 def test_panels_draw_on_a_figure_of_ones_own(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     beliefs = recording("seq1")
     with figure_file(tmp_path / "a.png", 8, 3) as figure:
         left, right = figure.subplots(1, 2)
@@ -185,7 +174,6 @@ def test_panels_draw_on_a_figure_of_ones_own(tmp_path: Path) -> None:
 
 
 def test_nothing_is_left_when_drawing_fails(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     with pytest.raises(RuntimeError), figure_file(tmp_path / "a.png", 2, 2):
         raise RuntimeError
     assert list(tmp_path.iterdir()) == []

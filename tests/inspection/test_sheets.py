@@ -1,12 +1,12 @@
 """The pictures of words: written whole, the same bytes each time, with every place, number and cross that they need."""
 
-import re
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.pictures import drawn_texts
 from helpers.small_world import write_images
 
 from placerec.errors import MissingExtraError, OutputError, VisionError
@@ -19,6 +19,8 @@ from placerec.inspection.word_stability import format_stability, plot_stability
 from placerec.inspection.words import WordTable
 from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
 from placerec.vision.stability import ChangeResult, Stability
+
+pytest.importorskip("matplotlib")
 
 RESULTS = (
     ChangeResult("JPEG", "quality 90", 3, 2),
@@ -37,11 +39,6 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
         [root / "seq1"], root / "words.npz", spec=DescriptorSpec(image_size=16), options=DictionaryOptions(size=4)
     )
     return root
-
-
-def drawn_text(path: Path) -> list[str]:
-    """The texts of an SVG: matplotlib leaves each beside its outlines, as a comment."""
-    return re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8"))
 
 
 def table(size: int, places: tuple[str, ...], seed: int = 0) -> WordTable:
@@ -74,11 +71,10 @@ def typical(world: Path, words: WordTable) -> dict[int, Gray]:
 
 def draw(world: Path, words: WordTable, path: Path) -> list[str]:
     draw_word_sheet(words, typical(world, words), path, title="Words")
-    return drawn_text(path)
+    return drawn_texts(path)
 
 
 def test_every_command_draws_the_same_bytes_each_time(world: Path, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     image, words = min((world / "seq1/std_cam").iterdir()), world / "words.npz"
     for name in ("a", "b"):
         show_words(words, [world / "seq2"], tmp_path / f"{name}.png")
@@ -92,7 +88,6 @@ def test_every_command_draws_the_same_bytes_each_time(world: Path, tmp_path: Pat
 
 
 def test_the_sheet_holds_every_place_and_every_number(world: Path, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     places = ("a$b$", "hall", "kitchen")
     words = table(5, places)
     text = draw(world, words, tmp_path / "a.svg")
@@ -109,7 +104,6 @@ def test_the_sheet_holds_every_place_and_every_number(world: Path, tmp_path: Pat
 
 
 def test_without_labels_the_sheet_says_so(world: Path, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     text = draw(world, table(3, ()), tmp_path / "a.svg")
     assert "(no label)" in text
     assert "No frame has a label: it is not known which place a word belongs to." in text
@@ -119,7 +113,6 @@ def test_without_labels_the_sheet_says_so(world: Path, tmp_path: Path) -> None:
 def test_long_names_of_many_places_are_shortened_and_nothing_leaves_the_sheet(
     world: Path, tmp_path: Path, size: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("matplotlib")
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
@@ -142,13 +135,12 @@ def test_long_names_of_many_places_are_shortened_and_nothing_leaves_the_sheet(
 
 
 def test_what_is_not_gist_has_bars_and_no_roses(world: Path, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     spec = DescriptorSpec(kind="centrist", image_size=16)
     train_dictionary([world / "seq1"], tmp_path / "centrist.npz", spec=spec, options=DictionaryOptions(size=3))
     image = min((world / "seq1/std_cam").iterdir())
     show_frame(image, world / "words.npz", out=tmp_path / "roses.svg")
     show_frame(image, tmp_path / "centrist.npz", out=tmp_path / "bars.svg")
-    roses, bars = (drawn_text(tmp_path / f"{name}.svg") for name in ("roses", "bars"))
+    roses, bars = (drawn_texts(tmp_path / f"{name}.svg") for name in ("roses", "bars"))
     assert f"The {spec.length} values of the descriptor" in bars
     for name in ("finest", "fine", "coarse", "coarsest"):
         assert f"Edges of the {name} scale" in roses
@@ -159,7 +151,6 @@ def test_what_is_not_gist_has_bars_and_no_roses(world: Path, tmp_path: Path) -> 
 
 
 def test_words_of_a_matrix_are_shown_and_cannot_be_made_from_images(world: Path, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     matrix, words = tmp_path / "rows.npy", tmp_path / "words.npz"
     np.save(matrix, np.random.default_rng(0).random((12, 20)).astype(np.float32))
     train_dictionary([world / "seq1"], words, options=DictionaryOptions(size=3), matrix=matrix)
@@ -185,9 +176,8 @@ def test_the_table_of_stability() -> None:
 
 
 def test_the_picture_of_stability_names_every_change(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     plot_stability(FOUND, tmp_path / "a.svg")
-    text = drawn_text(tmp_path / "a.svg")
+    text = drawn_texts(tmp_path / "a.svg")
     assert {"JPEG quality 90", "JPEG quality 30", "blur x", "45.0", "25.3", "0.0"} <= set(text)
 
 
