@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from placerec.errors import PlacerecError, SourceError, check_optional
-from placerec.frames.ros_image import COMPRESSED, RAW, gray_of
+from placerec.frames.image import as_gray, decode_gray
 from placerec.frames.sequence import Frame, Gray
 
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -23,6 +24,32 @@ _WAITING = 100
 _REMEDIES = {
     ".bag": "mend it with `rosbag reindex`, or remove it",
     ".mcap": "mend it with `mcap recover`, or remove it",
+}
+RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+
+# encoding -> channels, bytes a channel, OpenCV's conversion to grey ("" where the one channel is grey already).
+_ENCODINGS = {
+    "mono8": (1, 1, ""),
+    "8UC1": (1, 1, ""),
+    "mono16": (1, 2, ""),
+    "16UC1": (1, 2, ""),
+    "rgb8": (3, 1, "RGB2GRAY"),
+    "bgr8": (3, 1, "BGR2GRAY"),
+    "8UC3": (3, 1, "BGR2GRAY"),
+    "rgba8": (4, 1, "RGBA2GRAY"),
+    "bgra8": (4, 1, "BGRA2GRAY"),
+    "8UC4": (4, 1, "BGRA2GRAY"),
+    "rgb16": (3, 2, "RGB2GRAY"),
+    "bgr16": (3, 2, "BGR2GRAY"),
+    "yuv422": (2, 1, "YUV2GRAY_UYVY"),
+    "uyvy": (2, 1, "YUV2GRAY_UYVY"),
+    "yuv422_yuy2": (2, 1, "YUV2GRAY_YUY2"),
+    "yuyv": (2, 1, "YUV2GRAY_YUY2"),
+    **{
+        f"bayer_{order}{8 * size}": (1, size, f"Bayer{order.upper()}2GRAY")
+        for order in ("rggb", "bggr", "gbrg", "grbg")
+        for size in (1, 2)
+    },
 }
 log = logging.getLogger(__name__)
 
@@ -187,3 +214,48 @@ def _listed(names: list[str]) -> str:
 
 def _reason(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def gray_of(message: Any, kind: str, name: str) -> Gray:
+    """The grey levels 0..255 of a message of type `kind`.
+
+    16 bits as in `decode_gray`; 32FC1: what is no positive number is 0, and 1, or the greatest value if that is more,
+    becomes 255. Raises SourceError that begins with `name` for an encoding that is not read and for missing data.
+    """
+    data = np.asarray(message.data)
+    if kind == COMPRESSED:
+        return decode_gray(data.tobytes(), name)
+    if message.encoding == "32FC1":
+        return _of_floats(_pixels(message, data, 1, "f4", name)[..., 0], name)
+    if message.encoding not in _ENCODINGS:
+        known = ", ".join([*_ENCODINGS, "32FC1"])
+        raise SourceError(f"{name} has the encoding {message.encoding!r}, which is not read; known are {known}")
+    import cv2
+
+    channels, size, conversion = _ENCODINGS[message.encoding]
+    pixels = _pixels(message, data, channels, f"u{size}", name)
+    if not conversion:
+        return as_gray(pixels[..., 0], name)
+    if min(pixels.shape[:2]) > 1:
+        pixels = cv2.cvtColor(pixels[..., 0] if channels == 1 else pixels, getattr(cv2, f"COLOR_{conversion}"))
+    return as_gray(pixels, name)
+
+
+def _pixels(message: Any, data: NDArray[np.uint8], channels: int, kind: str, name: str) -> NDArray[Any]:
+    """The message's data as (height, width, channels), without the padding of its rows and in this machine's order."""
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    item = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
+    row = width * channels * item.itemsize
+    if not row or step < row or len(data) < height * step or not height:
+        what = f"{width}x{height} pixels in rows of {step} bytes need more than its {len(data)} bytes of data"
+        raise SourceError(f"{name} is damaged: {what}")
+    rows = data[: height * step].reshape(height, step)[:, :row]
+    return np.ascontiguousarray(rows).view(item).astype(kind).reshape(height, width, channels)
+
+
+def _of_floats(values: NDArray[np.float32], name: str) -> Gray:
+    values = np.where(np.isfinite(values) & (values > 0), values, np.float32(0)).astype(np.float32)
+    scaled = values * np.float32(255 / max(1.0, float(values.max())))
+    # Checked as any other picture is; its levels stay fractions.
+    as_gray(scaled.astype(np.uint8), name)
+    return scaled

@@ -1,30 +1,44 @@
-"""From what the user names to sequences: folders are searched, layouts told apart, names made unique."""
+"""From what the user names to sequences: folders are searched, layouts told apart, names made unique.
+
+A list on standard input (`-`): the path of an image a line, optionally followed by TAB seconds, and TAB place.
+"""
 
 import logging
+import math
 import os
+import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
-from placerec.errors import SourceError
-from placerec.frames import idol, image_list, vpc
+from placerec.errors import SourceError, at
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
-from placerec.frames.cold import CAMERA, LIST_FOLDER, find_list
-from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames, stamp
-from placerec.frames.intervals import find_intervals
+from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames
+from placerec.frames.layouts import (
+    COLD_CAMERA,
+    COLD_LIST_FOLDER,
+    IDOL_CAMERA,
+    find_places_list,
+    find_vpc_list,
+    read_labels,
+    room_in,
+    seconds_in,
+)
 from placerec.frames.naming import own_name, unique_names
-from placerec.frames.places import check_place, check_twins, read_places
+from placerec.frames.places import check_place, check_twins
 from placerec.frames.recordings import WANTED as RECORDED
-from placerec.frames.recordings import is_recording, read_recording
-from placerec.frames.sequence import Sequence, SourceOptions
+from placerec.frames.recordings import find_intervals, is_recording, read_recording
+from placerec.frames.sequence import Frame, Sequence, SourceOptions
 
 log = logging.getLogger(__name__)
 
 # COLD needs four (COLD/lab/part/sequence); the limit keeps a mistyped source from walking a whole disk.
 MAX_DEPTH = 6
 STREAM = Path("-")
+LIST_NAME, STDIN = "stdin", "<stdin>"
 
 
 @dataclass(frozen=True)
@@ -59,7 +73,7 @@ def find_sequences(
     found = [item for path in paths for item in _in_source(path, options.format)]
     _check_twice(found)
     _tell_unused(found, options)
-    own = [image_list.NAME if item.folder == STREAM else own_name(item.folder) for item in found]
+    own = [LIST_NAME if item.folder == STREAM else own_name(item.folder) for item in found]
     names = unique_names([(name, item.folder) for name, item in zip(own, found, strict=True)], SourceError)
     alone = sum(_is_recorded(item) for item in found) == 1
     read = [_read(item, name, options, alone=alone) for name, item in zip(names, found, strict=True)]
@@ -72,7 +86,7 @@ def _read(
 ) -> tuple[Sequence, Iterable[tuple[str, str]]]:
     """A sequence, and each of its places with the file and line, or the folder, that names it."""
     if item.folder == STREAM:
-        frames, where = image_list.read_list()
+        frames, where = _read_list()
         return Sequence(name, frames[:: options.every], item.folder), where
     if _is_recorded(item):
         intervals = find_intervals(item.camera, name, options.labels, alone=alone)
@@ -80,13 +94,7 @@ def _read(
         return Sequence(name, frames, item.folder, recording), intervals.positions() if intervals else ()
     labels = None
     if item.places:
-        from_vpc = item.places.name == vpc.LIST
-        floor = _absolute(item.folder).name
-        labels = (
-            vpc.read_places(item.places, floor, item.images)
-            if from_vpc
-            else read_places(item.places, frozenset(item.images))
-        )
+        labels = read_labels(item.places, _absolute(item.folder).name, item.images)
     files = read_frames(item.camera, item.images, labels=labels, place=item.place)[:: options.every]
     if labels:
         return Sequence(name, files, item.folder), labels.positions()
@@ -116,10 +124,10 @@ def _in_source(source: Path, format: str) -> list[_Found]:
         raise SourceError(f"{source}: is a file of no kind that is read; name a folder of {WANTED}, or {RECORDED}")
     if format == "places":
         return _place_folders(source)
-    found = [_camera(source.parent, source)] if _absolute(source).name == CAMERA else _below(source)
+    found = [_camera(source.parent, source)] if _absolute(source).name == COLD_CAMERA else _below(source)
     found = _without_aliases(found)
     if not found:
-        wanted = f"{CAMERA}/, {WANTED}, {RECORDED}"
+        wanted = f"{COLD_CAMERA}/, {WANTED}, {RECORDED}"
         raise SourceError(f"{source}: no sequence there; looked for {wanted}, {MAX_DEPTH} folders deep")
     if format == "auto" and _looks_like_places(source, found):
         log.warning(
@@ -137,20 +145,20 @@ def _below(folder: Path, depth: int = 0, seen: frozenset[str] = frozenset()) -> 
     if real in seen or depth > MAX_DEPTH:
         return []
     listing = list_folder(folder)
-    if CAMERA in listing.folders:
-        return [_camera(folder, folder / CAMERA)]
+    if COLD_CAMERA in listing.folders:
+        return [_camera(folder, folder / COLD_CAMERA)]
     if is_bag(folder):
         return [_Found(folder, folder)]
-    places = find_list(folder) or vpc.find_list(folder)
+    places = find_places_list(folder) or find_vpc_list(folder)
     if places and not listing.images:
-        log.warning("%s: no %s/ and no images beside it; not read", places, CAMERA)
+        log.warning("%s: no %s/ and no images beside it; not read", places, COLD_CAMERA)
     itself = [_Found(_owner(folder, listing.images), folder, listing.images, places)] if listing.images else []
-    if itself and (places or any(stamp(name) is not None for name in listing.images)):
+    if itself and (places or any(seconds_in(name) is not None for name in listing.images)):
         if listing.recordings:
             log.warning("%s: its images are read, and not %s beside them", folder, ", ".join(listing.recordings))
         return itself
     below = []
-    for name in sorted({*listing.folders, *listing.recordings} - {LIST_FOLDER}, key=natural_key):
+    for name in sorted({*listing.folders, *listing.recordings} - {COLD_LIST_FOLDER}, key=natural_key):
         path = folder / name
         below += [_Found(path, path)] if name in listing.recordings else _below(path, depth + 1, seen | {real})
     if below and itself:
@@ -161,7 +169,7 @@ def _below(folder: Path, depth: int = 0, seen: frozenset[str] = frozenset()) -> 
 
 def _owner(folder: Path, images: tuple[str, ...]) -> Path:
     """The folder that a sequence with images in `folder` is called after: in KTH-IDOL2 it holds png/."""
-    named = _absolute(folder).name == idol.CAMERA and all(map(idol.parse_name, images))
+    named = _absolute(folder).name == IDOL_CAMERA and all(map(room_in, images))
     return _absolute(folder).parent if named else folder
 
 
@@ -169,7 +177,7 @@ def _camera(folder: Path, camera: Path) -> _Found:
     images = list_folder(camera).images
     if not images:
         raise SourceError(f"{camera}: holds no image; looked for {WANTED}")
-    return _Found(folder, camera, images, find_list(folder, camera))
+    return _Found(folder, camera, images, find_places_list(folder, camera))
 
 
 def _without_aliases(found: list[_Found]) -> list[_Found]:
@@ -186,12 +194,12 @@ def _without_aliases(found: list[_Found]) -> list[_Found]:
 def _looks_like_places(source: Path, found: list[_Found]) -> bool:
     # A folder in a folder of the same name is how some archives unpack, and no place.
     name = _absolute(source).name
-    return find_list(source) is None and all(
+    return find_places_list(source) is None and all(
         item.folder == item.camera != source == item.camera.parent
         and item.folder.name != name
         and item.places is None
         and item.images
-        and all(stamp(name) is None for name in item.images)
+        and all(seconds_in(name) is None for name in item.images)
         for item in found
     )
 
@@ -224,3 +232,48 @@ def _check_twice(found: list[_Found]) -> None:
 def _absolute(path: Path) -> Path:
     # Not resolve(): a link keeps the name that the user gave it.
     return Path(os.path.abspath(path))
+
+
+def _read_list() -> tuple[tuple[Frame, ...], list[tuple[str, str]]]:
+    """The frames of a list, called as it calls them, and every place with the line that names it.
+
+    Frames are in the order of their seconds, without any in that of the lines. Raises SourceError naming the line: no
+    number, seconds in some lines alone, a name that cannot be a place's, a file named twice; and for an empty list.
+    """
+    if sys.stdin is None:
+        raise SourceError("`-`: reads standard input, and that is closed")
+    lines: dict[str, int] = {}
+    frames: list[Frame] = []
+    # As bytes: a file's name need not be UTF-8.
+    for number, line in enumerate(sys.stdin.buffer, start=1):
+        text = os.fsdecode(line).rstrip("\r\n")
+        if text.strip():
+            frame = _listed_frame(number, text)
+            first = lines.setdefault(frame.name, number)
+            if first != number:
+                raise SourceError(at(STDIN, number, f"{frame.name} is named in line {first} already; remove one"))
+            if frames and math.isnan(frame.time) != math.isnan(frames[0].time):
+                raise SourceError(at(STDIN, number, "some lines have seconds and others do not; give all or none"))
+            frames.append(frame)
+    if not frames:
+        raise SourceError(f"{STDIN}: names no image; give the path of an image a line")
+    positions = [(frame.place, f"{STDIN}:{lines[frame.name]}") for frame in frames if frame.place]
+    if not math.isnan(frames[0].time):
+        frames.sort(key=lambda frame: frame.time)
+    return tuple(frames), positions
+
+
+def _listed_frame(number: int, text: str) -> Frame:
+    path, *more = text.split("\t")
+    if len(more) > 2 or not path or "\0" in path:
+        raise SourceError(at(STDIN, number, f"{text!r} is not 'path [TAB seconds [TAB place]]'"))
+    seconds, place = (*more, "", "")[:2]
+    time = math.nan
+    if seconds:
+        with suppress(ValueError):
+            time = float(seconds)
+        if not math.isfinite(time):
+            raise SourceError(at(STDIN, number, f"{seconds!r} is not a number of seconds; mend it"))
+    if place and (reason := check_place(place)):
+        raise SourceError(at(STDIN, number, f"place {place!r} {reason}; rename it"))
+    return Frame(path, time, place, Path(path))

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
-from placerec.frames import bag, cold, idol, video
+from placerec.frames import bag, video
+from placerec.frames.layouts import room_in, seconds_in
 from placerec.frames.places import PlaceList
 from placerec.frames.sequence import Frame
 from placerec.frames.table import FrameTable
@@ -101,15 +102,6 @@ def list_folder(folder: Path) -> Listing:
     return Listing(tuple(images), tuple(recordings), tuple(sorted(folders, key=natural_key)))
 
 
-def stamp(name: str) -> float | None:
-    """The seconds in an image's name, if it is one of COLD or KTH-IDOL2."""
-    found = cold.parse_time(name)
-    if found is not None:
-        return found
-    named = idol.parse_name(name)
-    return None if named is None else named.time
-
-
 def _is_folder(entry: "os.DirEntry[str]") -> bool:
     try:
         return entry.is_dir()
@@ -135,7 +127,7 @@ def read_frames(folder: Path, images: Iterable[str], *, labels: PlaceList | None
         _report(labels, names)
         places = [labels.places.get(name, "") for name in names]
     else:
-        places = [named.place if (named := idol.parse_name(name)) else place for name in names]
+        places = [room_in(name) or place for name in names]
         if not any(places):
             log.info("%s: no places.lst; its frames have no label", folder)
     # What the sequence will be called is not known yet.
@@ -144,7 +136,7 @@ def read_frames(folder: Path, images: Iterable[str], *, labels: PlaceList | None
 
 def _times(folder: Path, images: Sequence[str]) -> NDArray[np.float64]:
     """The seconds in the names, nan for all where none has any."""
-    stamps = (math.nan if (found := stamp(name)) is None else found for name in images)
+    stamps = (math.nan if (found := seconds_in(name)) is None else found for name in images)
     times = np.fromiter(stamps, np.float64, len(images))
     timeless = np.isnan(times)
     if timeless.any() and not timeless.all():

@@ -1,13 +1,20 @@
-"""The images of some frames of a sequence, wherever they are stored."""
+"""The images of frames, wherever they are stored: of some, of all, and in batches.
 
-from collections.abc import Iterator
+A batch is the unit of work that is handed out, kept, and done again if it was lost.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Sequence as Ordered
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
 from placerec.errors import SourceError
+from placerec.files import content_digest
 from placerec.frames.image import read_gray
 from placerec.frames.sequence import Frame, Gray, Sequence
+
+BATCH = 64  # half a second of work
 
 
 def images_at(sequence: Sequence, indices: Ordered[int]) -> Iterator[Gray | str]:
@@ -40,8 +47,77 @@ def files_of(sequence: Sequence) -> list[Path]:
     return sequence.recording.files()
 
 
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Some consecutive frames of a sequence. `first`: the index of the first of them there.
+
+    `images`: their grey levels, or why there are none; None if each is still in a file of its own.
+    """
+
+    sequence: str
+    first: int
+    frames: tuple[Frame, ...]
+    images: tuple[Gray | str, ...] | None = None
+
+
+def batches(sequences: Iterable[Sequence]) -> Iterator[tuple[Sequence, Batch]]:
+    """All frames, in order, in batches of one sequence each; of recordings, without the images.
+
+    Only the frames of an endless recording come with their images, for they are not known before.
+    """
+    for sequence in sequences:
+        recording = sequence.recording
+        if recording is not None and recording.endless:
+            rest = recording.frames()
+            first = 0
+            while some := tuple(islice(rest, BATCH)):
+                frames, images = zip(*some, strict=True)
+                yield sequence, Batch(sequence.name, first, frames, images)
+                first += len(some)
+            continue
+        for first in range(0, len(sequence.frames), BATCH):
+            yield sequence, Batch(sequence.name, first, tuple(sequence.frames[first : first + BATCH]))
+
+
+def with_images(
+    listed: Iterable[tuple[Sequence, Batch]], shrink: Callable[[Gray | str], Gray | str]
+) -> Iterator[Batch]:
+    """The batches, those of recordings with their images, which are read in one pass from the first that is asked for.
+
+    `shrink` makes them smaller, so that little is kept and sent.
+    """
+    rest: Iterator[tuple[Frame, Gray | str]] = iter(())
+    current = ""
+    for sequence, batch in listed:
+        images = batch.images
+        if sequence.recording is not None and images is None:
+            if sequence.name != current:
+                rest, current = sequence.recording.frames(batch.first), sequence.name
+            found = {frame.name: shrink(image) for frame, image in islice(rest, len(batch.frames))}
+            images = tuple(found.get(frame.name, f"{frame.path}: frame {frame.name} is gone") for frame in batch.frames)
+        elif images is not None:
+            images = tuple(map(shrink, images))
+        yield replace(batch, images=images)
+
+
+def content_key(sequence: Sequence, batch: Batch) -> str:
+    """A digest of what the batch's images are read from: names, sizes and times of change of the files."""
+    recording = sequence.recording
+    files = [frame.path for frame in batch.frames] if recording is None else recording.files()
+    whole = None if recording is None else [repr(recording), batch.first, len(batch.frames)]
+    return content_digest(whole, [(str(path), _state(path)) for path in files])
+
+
 def _read(frame: Frame) -> Gray | str:
     try:
         return read_gray(frame.path)
     except SourceError as error:
         return str(error)
+
+
+def _state(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_size, found.st_mtime_ns

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from placerec.errors import PlacerecError
-from placerec.frames import vpc
+from placerec.frames.layouts import find_vpc_list
 
 
 def own_name(source: Path) -> str:
@@ -15,7 +15,7 @@ def own_name(source: Path) -> str:
     path = Path(os.path.abspath(source))
     if path.is_file():
         return path.stem
-    return f"{path.parent.name}-{path.name}" if vpc.find_list(path) else path.name
+    return f"{path.parent.name}-{path.name}" if find_vpc_list(path) else path.name
 
 
 def unique_names(named: Sequence[tuple[str, Path]], error: type[PlacerecError]) -> list[str]:

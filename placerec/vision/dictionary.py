@@ -17,8 +17,7 @@ from placerec.version import __version__
 from placerec.vision.chunks import CHUNK, Rows, Source, chunks, spooled
 from placerec.vision.describe import Descriptors
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
-from placerec.vision.quality import MapQuality, map_quality
-from placerec.vision.som import RULES, WIDTH, EpochProgress, Units, nearest_units, train_som
+from placerec.vision.som import RULES, WIDTH, EpochProgress, MapQuality, Units, map_quality, nearest_units, train_som
 from placerec.vision.spec import DescriptorSpec, descriptor
 from placerec.vision.storage import Arrays, fingerprint, read_npz, write_npz
 

@@ -14,7 +14,7 @@ from placerec.journal import open_journal
 from placerec.vision.chunks import Source
 from placerec.vision.describe import describe, keep_described, save_descriptors
 from placerec.vision.dictionary import Dictionary, DictionaryOptions, Quality
-from placerec.vision.quality import MapQuality
+from placerec.vision.som import MapQuality
 from placerec.vision.spec import DescriptorSpec
 
 log = logging.getLogger(__name__)

@@ -16,7 +16,7 @@ from placerec.errors import SourceError, VisionError
 from placerec.files import content_digest
 from placerec.frames import Frame, read_gray
 from placerec.frames import Sequence as FrameSequence
-from placerec.frames.batches import Batch, batches, content_key, with_images
+from placerec.frames.images import Batch, batches, content_key, with_images
 from placerec.frames.sequence import Gray
 from placerec.jobs import Executor, Progress, RemoteExecutor, workers
 from placerec.journal import Journal

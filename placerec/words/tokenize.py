@@ -8,7 +8,7 @@ from pathlib import Path
 from placerec.files import whole_folder
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import SourceOptions, find_sequences
-from placerec.frames.batches import Batch
+from placerec.frames.images import Batch
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal

@@ -18,8 +18,7 @@ import numpy as np
 from minisom import MiniSom
 from numpy.typing import NDArray
 
-from placerec.vision.quality import map_quality
-from placerec.vision.som import train_som
+from placerec.vision.som import map_quality, train_som
 
 SIDE, COMPONENTS, SPOTS = 20, 80, 300
 EPOCHS = (2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 50)

@@ -11,7 +11,7 @@ import pytest
 
 from placerec.errors import SourceError
 from placerec.frames import Sequence, SourceOptions, find_sequences, read_gray
-from placerec.frames.cold import parse_time
+from placerec.frames.layouts import seconds_in
 from placerec.frames.places import read_places
 
 # Lines of the nine real label files, as their SOURCE.md counts them.
@@ -54,7 +54,7 @@ LABELS = {
     ],
 )
 def test_names_of_all_laboratories(name: str, seconds: float | None) -> None:
-    assert parse_time(name) == seconds
+    assert seconds_in(name) == seconds
 
 
 @pytest.mark.parametrize("sequence", sorted(LINES))
@@ -63,7 +63,7 @@ def test_real_label_files(shared: Path, sequence: str) -> None:
     assert len(labels.places) == LINES[sequence]
     assert sorted(labels.lines.values()) == list(range(1, LINES[sequence] + 1))
     for name in labels.places:
-        seconds = parse_time(name)
+        seconds = seconds_in(name)
         assert seconds is not None
         assert seconds > 1.1e9
     if sequence in LABELS:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from placerec.errors import SourceError
 from placerec.frames import SourceOptions, find_sequences
-from placerec.frames.idol import Named, parse_name
+from placerec.frames.layouts import room_in, seconds_in
 
 # As the files are called; the third has an exponent and an integer, as %g writes them.
 NAMES = (
@@ -26,10 +26,10 @@ def make(folder: Path, names: tuple[str, ...] = NAMES) -> Path:
 
 
 def test_names() -> None:
-    assert parse_name(NAMES[0]) == Named(1117456789.25, "PA")
-    assert parse_name(NAMES[2]) == Named(1117456789.45, "EO")
+    assert (seconds_in(NAMES[0]), room_in(NAMES[0])) == (1117456789.25, "PA")
+    assert (seconds_in(NAMES[2]), room_in(NAMES[2])) == (1117456789.45, "EO")
     for name in ("t1.5_x1_y2_a3.png", "t1.5.png", "t1.5_rpa_x1_y2_a3.png", "t1.5_r_x1_y2_a3.png", "frame1.png"):
-        assert parse_name(name) is None
+        assert room_in(name) is None
 
 
 numbers = st.floats(-1e4, 1e4, allow_nan=False)
@@ -37,9 +37,8 @@ numbers = st.floats(-1e4, 1e4, allow_nan=False)
 
 @given(numbers, numbers, numbers, st.sampled_from(["BO", "CR", "EO", "KT", "PA"]))
 def test_names_as_they_are_written(x: float, y: float, angle: float, room: str) -> None:
-    found = parse_name(f"t{1117456789.25:.6f}_r{room}_x{x:g}_y{y:g}_a{angle:g}.png")
-    assert found is not None
-    assert (found.time, found.place) == (1117456789.25, room)
+    name = f"t{1117456789.25:.6f}_r{room}_x{x:g}_y{y:g}_a{angle:g}.png"
+    assert (seconds_in(name), room_in(name)) == (1117456789.25, room)
 
 
 @pytest.mark.parametrize("where", ["", "dum_cloudy1", "dum_cloudy1/png"])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from placerec.errors import SourceError
 from placerec.frames import find_sequences
-from placerec.frames.vpc import find_list, read_places
+from placerec.frames.layouts import find_vpc_list, read_labels
 
 LABELS = """1/
 6
@@ -108,7 +108,7 @@ def test_any_text_is_read_or_refused_by_file_and_line(text: str) -> None:
         found: set[str] = set()
         said = f"{path}:1: "
         try:
-            found = set(read_places(path, "1", images).places)
+            found = set(read_labels(path, "1", images).places)
         except SourceError as error:
             said = str(error)
         assert re.match(rf"{re.escape(str(path))}:\d+: [^\n]*$", said)
@@ -128,8 +128,8 @@ def test_real_labels(shared: Path, tmp_path: Path) -> None:
             lines = [line.split() for line in block.splitlines()]
             count = int(lines[0][0])
             images = [f"{number:08d}.jpg" for number in range(1, count + 1)]
-            assert find_list(one / floor) == path
-            found = read_places(path, floor, images).places
+            assert find_vpc_list(one / floor) == path
+            found = read_labels(path, floor, images).places
             expected = {}
             for first, last, place in lines[1 : next(i for i, line in enumerate(lines) if line[-1:] == ["end"])]:
                 for number in range(int(first), int(last) + 1):

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.vision.chunks import CHUNK, Stream, chunks
-from placerec.vision.quality import MapQuality, map_quality
-from placerec.vision.som import RULES, Som, best_units, train_som
+from placerec.vision.som import RULES, MapQuality, Som, best_units, map_quality, train_som
 
 
 def sample(n: int = 600, d: int = 6, seed: int = 0) -> NDArray[np.float32]:
