@@ -89,7 +89,9 @@ def new_places(unknown: Floats, new: Mask) -> NewPlaces:
     if not count or not others:
         return NewPlaces(count, others, None, np.empty(0), np.empty(0))
     detections, false_alarms = detected / count, (ends - detected) / others
-    return NewPlaces(count, others, float(np.trapezoid(detections, false_alarms)), false_alarms, detections)
+    # By trapezoids; numpy has a function for it, which is called differently before numpy 2.
+    area = (np.diff(false_alarms) * (detections[1:] + detections[:-1]) / 2).sum()
+    return NewPlaces(count, others, float(area), false_alarms, detections)
 
 
 def _by_blocks(score: Floats, hit: Mask) -> tuple[Floats, Floats]:

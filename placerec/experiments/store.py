@@ -56,15 +56,16 @@ def save(path: Path, content: dict[str, Any]) -> None:
 
 
 @contextmanager
-def held_output(out: Path) -> Iterator[None]:
-    """Make the folder of a run if need be, keep other runs out of it, and clear away files that a killed one left.
+def held_output(out: Path, cache: Path) -> Iterator[None]:
+    """Make the folders of a run if need be, keep other runs out of `out`, and clear away files that a killed one left.
 
-    Raises OutputError if the folder cannot be written or another run is at work there.
+    Raises OutputError if a folder cannot be written or another run is at work there.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{out}: cannot be written: {error.strerror or error}") from error
+    for folder in (out, cache):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
     with held_folder(out):
         for folder in (out, *(out / "cache").glob("*/")):
             for path in folder.glob(".*.partial-*"):

@@ -220,8 +220,10 @@ def test_sequences_that_nothing_can_be_compared_on_are_refused(runs: Path, tmp_p
     with pytest.raises(PlacerecError, match="no such file or folder"):
         compare([runs], [runs / "run9"], tmp_path / "out")
     (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(OutputError, match="cannot be written"):
+    with pytest.raises(OutputError, match="file: cannot be written"):
         run(runs, tmp_path / "file")
+    with pytest.raises(OutputError, match="file/cache: cannot be written"):
+        run(runs, tmp_path / "out", cache=tmp_path / "file/cache")
 
 
 def test_equal_names_get_their_parents_in_front(runs: Path, tmp_path: Path) -> None:

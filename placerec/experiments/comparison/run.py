@@ -63,7 +63,7 @@ def compare(
     check_figure(out / "methods.png")
     training, tests = _split(train, test, source_options)
     cache = out / "cache" if cache is None else Path(cache)
-    with held_output(out):
+    with held_output(out, cache):
         encoded = []
         for spec in SPECS[: 1 + any(COMPARED[name].kind == TWO_WORDS for name in chosen)]:
             with progress(f"describe ({spec.kind})") as show:

@@ -40,7 +40,7 @@ def experiment(config: Path | str, out: Path | str, *, jobs: int = 1, progress: 
     out = Path(out)
     check_figure(out / "figure.png")
     plan = read_config(config)
-    with held_output(out):
+    with held_output(out, out / "cache"):
         todo, results = run_grid(plan, out, jobs=jobs, progress=progress)
         write_reports(results, plan, Path(config), todo, out)
     return results
