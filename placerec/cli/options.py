@@ -285,12 +285,12 @@ def descriptor_options(function: Command) -> Command:
     )
     @functools.wraps(function)
     def described(*args: Any, descriptor: tuple[str, Path | None], **options: Any) -> Any:
-        from placerec.vision import SETTINGS, DescriptorSpec
+        from placerec.vision import KINDS, DescriptorSpec
 
         kind, matrix = descriptor
         settings = {name: options.pop(name) for name in ("variant", "image_size", "fit")}
         context = click.get_current_context()
-        for name in [name for name in settings if name not in SETTINGS[kind]]:
+        for name in [name for name in settings if name not in KINDS[kind].settings]:
             if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
                 raise click.UsageError(
                     f"--{name.replace('_', '-')} says nothing about {kind} descriptors; leave it out"

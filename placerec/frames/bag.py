@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Singles
 from placerec.errors import PlacerecError, SourceError, check_optional
 from placerec.frames.image import as_gray, decode_gray
 from placerec.frames.sequence import Frame, Gray
@@ -253,7 +254,7 @@ def _pixels(message: Any, data: NDArray[np.uint8], channels: int, kind: str, nam
     return np.ascontiguousarray(rows).view(item).astype(kind).reshape(height, width, channels)
 
 
-def _of_floats(values: NDArray[np.float32], name: str) -> Gray:
+def _of_floats(values: Singles, name: str) -> Gray:
     values = np.where(np.isfinite(values) & (values > 0), values, np.float32(0)).astype(np.float32)
     scaled = values * np.float32(255 / max(1.0, float(values.max())))
     # Checked as any other picture is; its levels stay fractions.

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats
 from placerec.errors import SourceError
 from placerec.frames import bag, video
 from placerec.frames.layouts import room_in, seconds_in
@@ -134,7 +134,7 @@ def read_frames(folder: Path, images: Iterable[str], *, labels: PlaceList | None
     return FileFrames(folder, FrameTable.of("", names, times, places))
 
 
-def _times(folder: Path, images: Sequence[str]) -> NDArray[np.float64]:
+def _times(folder: Path, images: Sequence[str]) -> Floats:
     """The seconds in the names, nan for all where none has any."""
     stamps = (math.nan if (found := seconds_in(name)) is None else found for name in images)
     times = np.fromiter(stamps, np.float64, len(images))

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Singles
 from placerec.errors import SourceError
 from placerec.frames.sequence import Gray
 
@@ -117,7 +118,7 @@ def _jpeg_frame(data: bytes) -> int:
     return 0
 
 
-def _stretch(pixels: NDArray[np.uint16]) -> NDArray[np.float32]:
+def _stretch(pixels: NDArray[np.uint16]) -> Singles:
     peak = int(pixels.max())
     depth = next(bits for bits in _DEPTHS if peak < 1 << bits)
     return pixels * np.float32(255 / ((1 << depth) - 1))

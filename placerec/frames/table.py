@@ -9,16 +9,17 @@ from typing import Self, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import SourceError
 from placerec.frames.sequence import Frame
 
-Rows = NDArray[np.int64] | NDArray[np.bool_] | Sequence[int] | slice
+RowIndex = Ints | Mask | Sequence[int] | slice
 
 
 class _Strings(Sequence[str]):
     """A column of n strings; equal to any sequence of the same strings, a tuple for instance."""
 
-    def take(self, rows: Rows) -> Self:
+    def take(self, rows: RowIndex) -> Self:
         """The strings of some rows, given by numbers, bool (n,) or a slice."""
         raise NotImplementedError
 
@@ -64,7 +65,7 @@ class Texts(_Strings):
     def __iter__(self) -> Iterator[str]:
         return (self._bytes[start:end].decode("utf-8", "surrogatepass") for start, end in pairwise(self._ends.tolist()))
 
-    def take(self, rows: Rows) -> Self:
+    def take(self, rows: RowIndex) -> Self:
         """The strings of some rows, given by numbers, bool (n,) or a slice."""
         starts, ends = self._ends[:-1][rows], self._ends[1:][rows]
         pieces = (self._bytes[a:b] for a, b in zip(starts.tolist(), ends.tolist(), strict=True))
@@ -77,7 +78,7 @@ class Texts(_Strings):
         return cls._of(b"".join(column._bytes for column in columns), np.concatenate([np.zeros(0, np.int64), *lengths]))
 
     @classmethod
-    def _of(cls, joined: bytes, lengths: NDArray[np.int64]) -> Self:
+    def _of(cls, joined: bytes, lengths: Ints) -> Self:
         column = cls()
         column._bytes, column._ends = joined, np.concatenate([np.zeros(1, np.int64), np.cumsum(lengths)])
         return column
@@ -105,15 +106,15 @@ class Labels(_Strings):
     def __iter__(self) -> Iterator[str]:
         return map(self._different.__getitem__, self._which.tolist())
 
-    def take(self, rows: Rows) -> Self:
+    def take(self, rows: RowIndex) -> Self:
         """The strings of some rows, given by numbers, bool (n,) or a slice."""
         return type(self)()._set(self._different, self._which[rows])
 
-    def codes(self, names: Sequence[str]) -> NDArray[np.int64]:
+    def codes(self, names: Sequence[str]) -> Ints:
         """The index of each string in `names`, int64 (n,), -1 for one that is not there."""
         index = {name: number for number, name in enumerate(names)}
         numbers = np.array([index.get(text, -1) for text in self._different], np.int64)
-        found: NDArray[np.int64] = numbers[self._which]
+        found: Ints = numbers[self._which]
         return found
 
     @classmethod
@@ -142,14 +143,14 @@ class FrameTable:
 
     names: Texts
     sequences: Labels
-    times: NDArray[np.float64]
+    times: Floats
     places: Labels
 
     @staticmethod
     def of(
         sequence: str,
         names: Iterable[str],
-        times: Sequence[float] | NDArray[np.float64] | None = None,
+        times: Sequence[float] | Floats | None = None,
         places: Iterable[str] | None = None,
     ) -> "FrameTable":
         """The frames of one sequence from columns; without times and places these are unknown.
@@ -198,15 +199,15 @@ class FrameTable:
         return f"FrameTable({len(self)} frames, {len({*self.sequences})} sequences, {places} places)"
 
     @property
-    def labelled(self) -> NDArray[np.bool_]:
+    def labelled(self) -> Mask:
         """Which frames have a place, bool (n,)."""
         return self.places.codes([""]) < 0
 
-    def take(self, rows: Rows) -> "FrameTable":
+    def take(self, rows: RowIndex) -> "FrameTable":
         """Some rows, given by numbers, bool (n,) or a slice."""
         return FrameTable(self.names.take(rows), self.sequences.take(rows), self.times[rows], self.places.take(rows))
 
-    def by_sequence(self) -> dict[str, NDArray[np.int64]]:
+    def by_sequence(self) -> dict[str, Ints]:
         """Sequence name -> the numbers of the rows of its frames, int64 (m,), both in order of appearance."""
         names = list(dict.fromkeys(self.sequences))
         code = self.sequences.codes(names)

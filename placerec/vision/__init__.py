@@ -6,10 +6,10 @@ from placerec.vision.dictionary import Dictionary, DictionaryOptions
 from placerec.vision.gist import gist
 from placerec.vision.images import fit_image
 from placerec.vision.sources import describe_sources, train_dictionary
-from placerec.vision.spec import SETTINGS, DescriptorSpec, descriptor
+from placerec.vision.spec import KINDS, DescriptorSpec, descriptor
 
 __all__ = [
-    "SETTINGS",
+    "KINDS",
     "DescriptorSpec",
     "Descriptors",
     "Dictionary",

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Singles
 from placerec.errors import VisionError
 from placerec.vision.images import check_gray
 
@@ -35,7 +36,7 @@ def census(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return codes
 
 
-def centrist(image: NDArray[Any]) -> NDArray[np.float32]:
+def centrist(image: NDArray[Any]) -> Singles:
     """The CENTRIST of one grey image: in each of 2 x 2 windows, the share of its pixels that have each code 1..254.
 
     image: (h, w), grey of 0..255, uint8, uint16 (taken as 0..65535) or float, rounded to whole levels; 8 x 8 at least.
@@ -51,5 +52,5 @@ def centrist(image: NDArray[Any]) -> NDArray[np.float32]:
     rows, columns = (np.arange(side) * WINDOWS // side for side in codes.shape)
     window = rows[:, None] * WINDOWS + columns
     counts = np.bincount((window * 256 + codes).ravel(), minlength=WINDOWS**2 * 256).reshape(-1, 256)
-    shares: NDArray[np.float32] = (counts[:, 1:255] / counts.sum(axis=1, keepdims=True)).astype(np.float32)
+    shares: Singles = (counts[:, 1:255] / counts.sum(axis=1, keepdims=True)).astype(np.float32)
     return shares.ravel()

@@ -6,27 +6,26 @@ from contextlib import contextmanager
 from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Singles
 from placerec.errors import VisionError
 from placerec.jobs import Executor, ScatteredMap, scatter
 from placerec.vision.exact import TERMS
 
-Rows = NDArray[np.float32]
-Stream = Callable[[], Iterator[Rows]]  # called once for every pass: gives all rows from the start, in pieces
-Source = Rows | Stream  # (n, d) in memory or memory-mapped, or streamed
+Stream = Callable[[], Iterator[Singles]]  # called once for every pass: gives all rows from the start, in pieces
+Source = Singles | Stream  # (n, d) in memory or memory-mapped, or streamed
 
 CHUNK = TERMS  # no more, or the sums of the PCA would round
 IN_MEMORY = 1 << 26  # bytes
 
 
-def chunks(source: Source) -> Iterator[Rows]:
+def chunks(source: Source) -> Iterator[Singles]:
     """All rows in order, in pieces of 4096 (the last may be shorter), so that the order of every sum is fixed."""
     if not callable(source):
         for first in range(0, len(source), CHUNK):
             yield source[first : first + CHUNK]
         return
-    waiting: list[Rows] = []
+    waiting: list[Singles] = []
     count = 0
     for piece in source():
         waiting.append(piece)
@@ -52,17 +51,17 @@ class SpooledRows:
         for rows in chunks(source):
             file.write(rows.astype(np.float32, copy=False).tobytes())
             self._count, self._width = self._count + 1, rows.shape[1]
-        self.each: ScatteredMap[Rows] = scatter(self, work)
+        self.each: ScatteredMap[Singles] = scatter(self, work)
 
     def __len__(self) -> int:
         return self._count
 
-    def __getitem__(self, at: int) -> Rows:
+    def __getitem__(self, at: int) -> Singles:
         size = 4 * self._width * CHUNK
         self._file.seek(at * size)
         return np.frombuffer(self._file.read(size), np.float32).reshape(-1, self._width)
 
-    def __call__(self) -> Iterator[Rows]:
+    def __call__(self) -> Iterator[Singles]:
         return map(self.__getitem__, range(len(self)))
 
 
@@ -73,7 +72,7 @@ def spooled(source: Source, work: Executor | None = None) -> Iterator[SpooledRow
         yield SpooledRows(file, source, work)
 
 
-def each_chunk(source: Source) -> ScatteredMap[Rows]:
+def each_chunk(source: Source) -> ScatteredMap[Singles]:
     """Maps functions over the chunks of a source: one function for every pass."""
     return source.each if isinstance(source, SpooledRows) else lambda function: map(function, chunks(source))
 

@@ -9,15 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Singles
 from placerec.errors import VisionError
 from placerec.frames import Sequence
-from placerec.frames.table import FrameTable, Rows
+from placerec.frames.table import FrameTable, RowIndex
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal
 from placerec.vision.external import read_rows
-from placerec.vision.gist import Floats
 from placerec.vision.spec import DescriptorSpec, check_describes_images
 from placerec.vision.storage import StreamedArray, text_column, write_npz
 from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
@@ -34,7 +33,7 @@ class Descriptors:
     """
 
     spec: DescriptorSpec
-    values: NDArray[np.float32]
+    values: Singles
     table: FrameTable
     skipped: int = 0
     constant: int = 0
@@ -54,7 +53,7 @@ class Descriptors:
         return tuple(self.table.sequences)
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """Seconds, float64 (n,), nan where unknown."""
         return self.table.times
 
@@ -63,7 +62,7 @@ class Descriptors:
         """The labels, "" where there is none."""
         return tuple(self.table.places)
 
-    def take(self, rows: Rows) -> "Descriptors":
+    def take(self, rows: RowIndex) -> "Descriptors":
         """Those of some frames, given by numbers, bool (n,) or a slice; what was skipped or constant is not counted."""
         return Descriptors(self.spec, self.values[rows], self.table.take(rows))
 
@@ -110,7 +109,7 @@ def described(
     work: Executor | None = None,
     journal: Journal | None = None,
     progress: Progress | None = None,
-) -> Iterator[tuple[FrameTable, Floats]]:
+) -> Iterator[tuple[FrameTable, Singles]]:
     """Batch after batch the frames that have a descriptor, and these (m, spec.length); else as `describe`."""
     check_describes_images(spec)
     function = partial(describe_batch, spec)
@@ -130,7 +129,7 @@ class KeptDescriptors:
     counts: FrameCounts
     journal: Journal
 
-    def pieces(self) -> Iterator[Floats]:
+    def pieces(self) -> Iterator[Singles]:
         """The descriptors, batch by batch, again at every call."""
         for content in self.journal.contents():
             yield BatchResult.unpack(content).arrays["values"]
@@ -172,7 +171,7 @@ def save_descriptors(descriptors: Descriptors | KeptDescriptors, path: Path | st
     """Write descriptors.npz: `descriptors` (n, d) float32, `frames`, `sequences`, `times`, `places` and JSON `meta`."""
     table, spec = descriptors.table, descriptors.spec
     if isinstance(descriptors, Descriptors):
-        values: Floats | StreamedArray = descriptors.values
+        values: Singles | StreamedArray = descriptors.values
         counts: Descriptors | FrameCounts = descriptors
     else:
         values, counts = StreamedArray((len(table), spec.length), descriptors.pieces), descriptors.counts

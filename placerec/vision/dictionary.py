@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Ints, Singles
 from placerec.errors import VisionError
 from placerec.frames.sequence import Gray
 from placerec.jobs import Executor
 from placerec.version import __version__
-from placerec.vision.chunks import CHUNK, Rows, Source, chunks, spooled
+from placerec.vision.chunks import CHUNK, Source, chunks, spooled
 from placerec.vision.describe import Descriptors
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
 from placerec.vision.som import RULES, WIDTH, EpochProgress, MapQuality, Units, map_quality, nearest_units, train_som
@@ -97,8 +97,8 @@ class Dictionary:
 
     spec: DescriptorSpec
     pca: Pca
-    codebook: NDArray[np.float32]
-    hits: NDArray[np.int64]
+    codebook: Singles
+    hits: Ints
     training: DictionaryOptions
     quality: Quality
     sequences: tuple[str, ...] = ()
@@ -172,7 +172,7 @@ class Dictionary:
         """
         return fingerprint(self._arrays(), {"descriptor": self.spec.as_dict(), "units": self.training.units})
 
-    def words(self, descriptors: Rows | Descriptors) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    def words(self, descriptors: Singles | Descriptors) -> tuple[Ints, Singles]:
         """The unit of every descriptor (n, spec.length), int64 (n,), and its distance in PCA space, float32 (n,).
 
         A frame's answer does not depend on the frames around it. Raises VisionError for unusable descriptors, and for
@@ -180,7 +180,7 @@ class Dictionary:
         """
         return nearest_units(self._codes(descriptors), self._units)
 
-    def quality_of(self, descriptors: Rows | Descriptors) -> MapQuality:
+    def quality_of(self, descriptors: Singles | Descriptors) -> MapQuality:
         """How well the map represents these frames, for instance of recordings that trained nothing."""
         return map_quality(self._codes(descriptors), self.codebook, self.hits)
 
@@ -210,7 +210,7 @@ class Dictionary:
     def _units(self) -> Units:
         return Units.of(self.codebook, self.hits > 0 if self.training.units == "live" else None)
 
-    def _codes(self, descriptors: Rows | Descriptors) -> Rows:
+    def _codes(self, descriptors: Singles | Descriptors) -> Singles:
         if isinstance(descriptors, Descriptors):
             if descriptors.spec != self.spec:
                 raise VisionError(
@@ -241,7 +241,7 @@ def _checked(descriptors: Source, spec: DescriptorSpec) -> Source:
         return _check(descriptors, spec)
     give = descriptors
 
-    def pieces() -> Iterator[Rows]:
+    def pieces() -> Iterator[Singles]:
         first = 0
         for piece in give():
             yield _check(piece, spec, first)
@@ -250,7 +250,7 @@ def _checked(descriptors: Source, spec: DescriptorSpec) -> Source:
     return pieces
 
 
-def _check(descriptors: Rows, spec: DescriptorSpec, first: int = 0) -> Rows:
+def _check(descriptors: Singles, spec: DescriptorSpec, first: int = 0) -> Singles:
     """The descriptors as float32; `first`: the index of their first row, for the message."""
     rows = np.asarray(descriptors)
     if rows.ndim != 2 or rows.dtype.kind not in "uif":
@@ -271,7 +271,7 @@ def _drawn(source: Source, n: int, fraction: float, rng: np.random.Generator) ->
     kept = np.zeros(n, np.bool_)
     kept[rng.permutation(n)[: max(1, round(fraction * n))]] = True
 
-    def pieces() -> Iterator[Rows]:
+    def pieces() -> Iterator[Singles]:
         first = 0
         for rows in chunks(source):
             yield rows[kept[first : first + len(rows)]]

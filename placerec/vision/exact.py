@@ -6,13 +6,14 @@ of two that are small enough for float64 to hold every partial sum (the idea of 
 """
 
 import numpy as np
-from numpy.typing import NDArray
+
+from placerec.arrays import Floats
 
 BITS = 20
 TERMS = 1 << 12  # products that may be added: 2**(20 + 20 + 12) is below 2**53
 
 
-def split(x: NDArray[np.float64], *, axis: int | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def split(x: Floats, *, axis: int | None = None) -> tuple[Floats, Floats]:
     """(coarse, fine) with coarse + fine = x up to 2**-41 of the largest magnitude along `axis` (None: of all).
 
     Both are multiples of a power of two, at most 2**20 of them.
@@ -25,22 +26,22 @@ def split(x: NDArray[np.float64], *, axis: int | None = None) -> tuple[NDArray[n
     return coarse, np.rint((x - coarse) / unit) * unit
 
 
-def on_grid(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def on_grid(x: Floats) -> Floats:
     """Values within -1..1, rounded to whole multiples of 2**-20."""
-    grid: NDArray[np.float64] = np.ldexp(np.rint(np.ldexp(x, BITS)), -BITS)
+    grid: Floats = np.ldexp(np.rint(np.ldexp(x, BITS)), -BITS)
     return grid
 
 
-def gram(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def gram(x: Floats) -> Floats:
     """x' x of (n, d) with n <= TERMS: (d, d)."""
     coarse, fine = split(x)
     mixed = coarse.T @ fine
-    product: NDArray[np.float64] = coarse.T @ coarse + (mixed + mixed.T) + fine.T @ fine
+    product: Floats = coarse.T @ coarse + (mixed + mixed.T) + fine.T @ fine
     return product
 
 
-def product(x: NDArray[np.float64], grid: NDArray[np.float64]) -> NDArray[np.float64]:
+def product(x: Floats, grid: Floats) -> Floats:
     """x @ grid of (n, d) with d <= TERMS and (d, k) from `on_grid`; a row's result is the same in any batch."""
     coarse, fine = split(x, axis=1)
-    result: NDArray[np.float64] = coarse @ grid + fine @ grid
+    result: Floats = coarse @ grid + fine @ grid
     return result

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Singles
 from placerec.errors import VisionError
 from placerec.vision.exact import TERMS
 from placerec.vision.storage import reading
@@ -20,7 +21,7 @@ Name = tuple[str, str]  # of the sequence, of the frame
 _CHUNK = 4096
 
 
-def read_rows(path: Path, frames: Sequence[Name]) -> tuple[NDArray[np.float32], list[int]]:
+def read_rows(path: Path, frames: Sequence[Name]) -> tuple[Singles, list[int]]:
     """The rows of the matrix in `path` that belong to `frames`, float32 (m, d), and the indices of these frames.
 
     A frame that an .npz with names leaves out of a sequence that it has is left out here, too. A float32 .npy stays on
@@ -91,7 +92,7 @@ def _rows_named(names: Sequence[Name], frames: Sequence[Name]) -> tuple[list[int
     return [where[frames[k]] for k in kept], kept
 
 
-def _first_bad(values: NDArray[np.float32]) -> int | None:
+def _first_bad(values: Singles) -> int | None:
     for first in range(0, len(values), _CHUNK):
         good = np.isfinite(values[first : first + _CHUNK]).all(axis=1)
         if not good.all():

@@ -16,10 +16,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from placerec.arrays import Singles
 from placerec.errors import VisionError
 from placerec.vision.images import check_gray, fit_image
-
-Floats = NDArray[np.float32]
 
 VARIANTS = ("lmgist", "classic")
 BORDER = 32  # pixels mirrored around the whitened image by lmgist; classic wraps around instead
@@ -34,7 +33,7 @@ def gist(
     size: int | None = None,
     orientations: Sequence[int] = (6, 6, 6, 6),
     blocks: int = 4,
-) -> Floats:
+) -> Singles:
     """The GIST of one grey image: mean Gabor magnitude of every filter in every block (our GIST specification).
 
     image: (h, w), grey of 0..255, uint8, uint16 (taken as 0..65535) or float; any size from 8 x 8 on.
@@ -62,7 +61,7 @@ def gist(
     return _filter_means(prefilter(values), BORDER if variant == "lmgist" else 0, tuple(orientations), blocks)
 
 
-def prefilter(values: Floats) -> Floats:
+def prefilter(values: Singles) -> Singles:
     """Whitening and local contrast normalisation (section 2 of our GIST specification): (h, w) 0..255 to float32."""
     height, width = values.shape
     padded = _mirror(np.log(values + np.float32(1)), _MARGIN, _MARGIN, _MARGIN, _MARGIN)
@@ -74,22 +73,22 @@ def prefilter(values: Floats) -> Floats:
     detail = padded - _lowpass(padded)
     contrast = np.sqrt(np.abs(_lowpass(detail * detail)))
     whitened = detail / (np.float32(0.2) + contrast)
-    return cast(Floats, whitened[_MARGIN : _MARGIN + height, _MARGIN : _MARGIN + width])
+    return cast(Singles, whitened[_MARGIN : _MARGIN + height, _MARGIN : _MARGIN + width])
 
 
-def _mirror(values: Floats, top: int, bottom: int, left: int, right: int) -> Floats:
-    return cast(Floats, cv2.copyMakeBorder(values, top, bottom, left, right, cv2.BORDER_REFLECT))
+def _mirror(values: Singles, top: int, bottom: int, left: int, right: int) -> Singles:
+    return cast(Singles, cv2.copyMakeBorder(values, top, bottom, left, right, cv2.BORDER_REFLECT))
 
 
-def _lowpass(square: Floats) -> Floats:
+def _lowpass(square: Singles) -> Singles:
     # An FFT and not two matrix products with the circulant: their bits would depend on the BLAS and its threads.
     spectrum = scipy.fft.rfft2(square)
     spectrum *= _lowpass_transfer(len(square))
-    return cast(Floats, scipy.fft.irfft2(spectrum, s=square.shape, overwrite_x=True))
+    return cast(Singles, scipy.fft.irfft2(spectrum, s=square.shape, overwrite_x=True))
 
 
 @lru_cache(maxsize=4)
-def _lowpass_transfer(side: int) -> Floats:
+def _lowpass_transfer(side: int) -> Singles:
     """(side, side // 2 + 1): exp(-(fx² + fy²) ln 2 / cycles²), half a plane as rfft2 has it; read-only."""
     falloff = np.exp(-(np.fft.fftfreq(side, 1 / side) ** 2) * np.log(2) / _CYCLES**2)
     transfer = np.outer(falloff, falloff[: side // 2 + 1]).astype(np.float32)
@@ -97,12 +96,12 @@ def _lowpass_transfer(side: int) -> Floats:
     return transfer
 
 
-def _filter_means(whitened: Floats, border: int, orientations: tuple[int, ...], blocks: int) -> Floats:
+def _filter_means(whitened: Singles, border: int, orientations: tuple[int, ...], blocks: int) -> Singles:
     extended = _mirror(whitened, border, border, border, border)
     rows, columns = extended.shape
     spectrum = _spectrum(extended)
     # A scale at a time where the bank is kept: fewer calls, and fewer waits of threads for the interpreter's lock.
-    groups: Iterable[Floats]
+    groups: Iterable[Singles]
     if rows * columns <= _CACHED_PIXELS:
         groups = _bank(rows, columns, orientations)
     else:
@@ -123,9 +122,9 @@ def _filter_means(whitened: Floats, border: int, orientations: tuple[int, ...], 
 _kept = threading.local()
 
 
-def _memory(count: int) -> Floats:
+def _memory(count: int) -> Singles:
     """Memory for `count` numbers that the thread uses again: fresh pages would cost as much as the transforms."""
-    memory: Floats = getattr(_kept, "memory", np.empty(0, np.float32))
+    memory: Singles = getattr(_kept, "memory", np.empty(0, np.float32))
     if len(memory) < count:
         memory = _kept.memory = np.empty(count, np.float32)
     return memory[:count]
@@ -137,19 +136,19 @@ def _has_ipp() -> bool:
     return bool(cv2.ipp.useIPP())
 
 
-def _spectrum(image: Floats) -> Floats:
+def _spectrum(image: Singles) -> Singles:
     """The DFT divided by the number of pixels: (h, w, 2), real and imaginary parts."""
     if not _has_ipp():
         spectrum = scipy.fft.fft2(image, norm="forward")
-        return cast(Floats, spectrum.view(np.float32).reshape(*image.shape, 2))
+        return cast(Singles, spectrum.view(np.float32).reshape(*image.shape, 2))
     # OpenCV transforms complex arrays four times faster than real ones, and the factor of the inverse transforms is
     # cheaper paid here once.
     plane = np.zeros((*image.shape, 2), np.float32)
     plane[..., 0] = image
-    return cast(Floats, cv2.dft(plane, dst=plane, flags=cv2.DFT_SCALE))
+    return cast(Singles, cv2.dft(plane, dst=plane, flags=cv2.DFT_SCALE))
 
 
-def _responses(spectra: Floats) -> NDArray[np.complex64]:
+def _responses(spectra: Singles) -> NDArray[np.complex64]:
     """The inverse DFTs without a factor, complex (n, h, w), of (n, h, w, 2), whose memory is used up."""
     numbers = spectra.view(np.complex64)[..., 0]
     if not _has_ipp():
@@ -163,25 +162,25 @@ def _edges(length: int, blocks: int) -> list[int]:
     return [k * length // blocks for k in range(blocks + 1)]
 
 
-def _band_sums(magnitudes: Floats, blocks: int) -> Floats:
+def _band_sums(magnitudes: Singles, blocks: int) -> Singles:
     """(n, blocks, w): the sums of (n, h, w) over the rows of each row of blocks."""
     n, height, width = magnitudes.shape
     if height % blocks == 0:
-        sums: Floats = magnitudes.reshape(n, blocks, -1, width).sum(axis=2)
+        sums: Singles = magnitudes.reshape(n, blocks, -1, width).sum(axis=2)
         return sums
     return np.stack([magnitudes[:, a:b].sum(axis=1) for a, b in pairwise(_edges(height, blocks))], axis=1)
 
 
-def _block_means(bands: Floats, height: int, blocks: int) -> Floats:
+def _block_means(bands: Singles, height: int, blocks: int) -> Singles:
     """(filters * blocks²,) means from the (filters, blocks, w) sums of bands, block columns outermost."""
     tops, lefts = _edges(height, blocks), _edges(bands.shape[2], blocks)
     sums = np.add.reduceat(bands.astype(np.float64), lefts[:-1], axis=2)
-    means: Floats = (sums / np.outer(np.diff(tops), np.diff(lefts))).astype(np.float32)
+    means: Singles = (sums / np.outer(np.diff(tops), np.diff(lefts))).astype(np.float32)
     return means.transpose(0, 2, 1).ravel()
 
 
 @lru_cache(maxsize=4)
-def _bank(rows: int, columns: int, orientations: tuple[int, ...]) -> tuple[Floats, ...]:
+def _bank(rows: int, columns: int, orientations: tuple[int, ...]) -> tuple[Singles, ...]:
     """The transfer functions of each scale, (orientations, rows, columns, 2), read-only."""
     filters = _filters(rows, columns, orientations)
     scales = tuple(np.stack([next(filters) for _ in range(count)]) for count in orientations)
@@ -190,7 +189,7 @@ def _bank(rows: int, columns: int, orientations: tuple[int, ...]) -> tuple[Float
     return scales
 
 
-def _filters(rows: int, columns: int, orientations: tuple[int, ...]) -> Iterator[Floats]:
+def _filters(rows: int, columns: int, orientations: tuple[int, ...]) -> Iterator[Singles]:
     """The Gabor transfer functions (section 3 of our GIST specification), each (rows, columns, 2), finest scale first.
 
     They are real; every value is there twice, for the real and the imaginary part that it multiplies.

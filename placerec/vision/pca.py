@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Singles
 from placerec.errors import VisionError
 from placerec.jobs import Executor, remote_or_local_map
 from placerec.vision import exact
@@ -22,8 +22,8 @@ class Moments:
     """What a PCA needs to know of n rows: their mean (d,) and their scatter about it (d, d), both float64."""
 
     n: int
-    mean: NDArray[np.float64]
-    scatter: NDArray[np.float64]
+    mean: Floats
+    scatter: Floats
 
     @classmethod
     def none(cls, width: int) -> "Moments":
@@ -31,7 +31,7 @@ class Moments:
         return cls(0, np.zeros(width), np.zeros((width, width)))
 
     @classmethod
-    def of(cls, rows: NDArray[np.float32]) -> "Moments":
+    def of(cls, rows: Singles) -> "Moments":
         """The moments of rows (m, d), 0 < m <= exact.TERMS."""
         values = rows.astype(np.float64)
         mean = values.sum(axis=0) / len(rows)
@@ -52,14 +52,14 @@ class Pca:
     `explained`: the share of the variance that the k components keep; `needed`: how many would keep 99 %.
     """
 
-    mean: NDArray[np.float64]
-    components: NDArray[np.float32]
-    variances: NDArray[np.float32]
+    mean: Floats
+    components: Singles
+    variances: Singles
     explained: float
     needed: int
 
     @cached_property
-    def grid(self) -> NDArray[np.float64]:
+    def grid(self) -> Floats:
         """The components as `exact.product` takes them, (d, k)."""
         return self.components.T.astype(np.float64)
 
@@ -104,7 +104,7 @@ def fit_pca(data: Moments, components: int = 80) -> Pca:
     return Pca(data.mean, leading.astype(np.float32), values[:k].astype(np.float32), explained, needed)
 
 
-def project(rows: NDArray[np.float32], pca: Pca) -> NDArray[np.float32]:
+def project(rows: Singles, pca: Pca) -> Singles:
     """Coordinates float32 (n, k) of rows (n, d); a row's are the same whatever other rows are there."""
     codes = np.empty((len(rows), len(pca.components)), np.float32)
     for first in range(0, len(rows), CHUNK):

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
+from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.errors import VisionError
-from placerec.vision.chunks import CHUNK, Rows, Source, check_again, chunks, each_chunk
+from placerec.vision.chunks import CHUNK, Source, check_again, chunks, each_chunk
 
 EpochProgress = Callable[[int, int, float], None]  # epoch (from 1), epochs, quantisation error
 
@@ -27,8 +28,8 @@ _TINY = 1e-290  # below this a neighbourhood's weight has lost its digits to und
 class Som:
     """Codebook float32 (size**2, k); hits int64 (size**2,), the training frames per unit; the epochs that were run."""
 
-    codebook: NDArray[np.float32]
-    hits: NDArray[np.int64]
+    codebook: Singles
+    hits: Ints
     epochs: int
 
 
@@ -40,13 +41,13 @@ class Units:
     float32 (K,): half their squared norms, and `largest` the largest squared norm.
     """
 
-    among: NDArray[np.int64] | None
-    places: Rows
-    halves: NDArray[np.float32]
+    among: Ints | None
+    places: Singles
+    halves: Singles
     largest: float
 
     @classmethod
-    def of(cls, codebook: Rows, live: NDArray[np.bool_] | None = None) -> "Units":
+    def of(cls, codebook: Singles, live: Mask | None = None) -> "Units":
         """A codebook made ready; `live` (K,): the units to choose from, all by default."""
         among = None if live is None else np.flatnonzero(live)
         places = codebook if among is None else codebook[among]
@@ -87,7 +88,7 @@ def train_som(
     return Som(codebook, hits, epochs)
 
 
-def _hits(units: Units, rows: Rows) -> NDArray[np.int64]:
+def _hits(units: Units, rows: Singles) -> Ints:
     """How many of the rows each unit (K,) is nearest to."""
     return np.bincount(_search(rows, units), minlength=len(units.places))
 
@@ -101,11 +102,11 @@ class _Share:
     """
 
     units: NDArray[np.unsignedinteger[Any]]
-    sums: NDArray[np.float64]
+    sums: Floats
     distance: float
 
 
-def _share(ready: Units, measured: bool, rows: Rows) -> _Share:
+def _share(ready: Units, measured: bool, rows: Singles) -> _Share:
     units = _search(rows, ready)
     count = len(ready.places)
     sums = _unit_sums(rows, units, count)[np.bincount(units, minlength=count) > 0]
@@ -116,12 +117,12 @@ def _share(ready: Units, measured: bool, rows: Rows) -> _Share:
 def _batch(
     source: Source,
     n: int,
-    codebook: Rows,
+    codebook: Singles,
     rng: np.random.Generator,
     width: float,
     epochs: int,
     progress: EpochProgress | None,
-) -> tuple[Rows, int]:
+) -> tuple[Singles, int]:
     """The codebook after at most `epochs` passes, and the number of passes that moved it."""
     cooling = (epochs + 1) // 2
     widths = np.geomspace(max(len(codebook) ** 0.5 / 2, width), width, cooling) if cooling > 1 else [width]
@@ -151,12 +152,12 @@ def _batch(
 def _online(
     source: Source,
     n: int,
-    codebook: Rows,
+    codebook: Singles,
     rng: np.random.Generator,
     width: float,
     epochs: int,
     progress: EpochProgress | None,
-) -> tuple[Rows, int]:
+) -> tuple[Singles, int]:
     """Kohonen's rule; the quantisation error that `progress` is told is that of the frames as they were met."""
     rows = np.concatenate(list(chunks(source)))
     check_again(len(rows), n)
@@ -186,9 +187,7 @@ def _online(
     return weights.astype(np.float32), epochs
 
 
-def best_units(
-    codes: Rows, codebook: Rows, live: NDArray[np.bool_] | None = None
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+def best_units(codes: Singles, codebook: Singles, live: Mask | None = None) -> tuple[Ints, Singles]:
     """The nearest unit of every row of (n, k): int64 (n,), and the Euclidean distance to it: float32 (n,).
 
     `live` (K,): units to choose from, all by default. Of equally near units the first is taken.
@@ -196,25 +195,25 @@ def best_units(
     return nearest_units(codes, Units.of(codebook, live))
 
 
-def nearest_units(codes: Rows, units: Units) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+def nearest_units(codes: Singles, units: Units) -> tuple[Ints, Singles]:
     """`best_units` of a codebook that is ready: what a frame at a time would otherwise be computed for every frame."""
     found = _search(codes, units)
     far = distances(codes, units.places, found).astype(np.float32)
     return found if units.among is None else units.among[found], far
 
 
-def torn(codes: Rows, codebook: Rows, nearest: NDArray[np.int64]) -> NDArray[np.bool_]:
+def torn(codes: Singles, codebook: Singles, nearest: Ints) -> Mask:
     """Which rows (n,) have a second nearest unit that is not one of the 8 neighbours of the nearest."""
     if len(codebook) == 1:
         return np.zeros(len(codes), np.bool_)
     size = round(len(codebook) ** 0.5)
     second = _search(codes, Units.of(codebook), without=nearest)
     down, right = nearest // size - second // size, nearest % size - second % size
-    far: NDArray[np.bool_] = np.maximum(np.abs(down), np.abs(right)) > 1
+    far: Mask = np.maximum(np.abs(down), np.abs(right)) > 1
     return far
 
 
-def _spread(source: Source) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
+def _spread(source: Source) -> tuple[int, Floats, Floats]:
     """The number of rows, and mean and standard deviation of every column, in one pass (Chan's formula)."""
     n, mean, squares = 0, np.zeros(1), np.zeros(1)
     for m, here, its in each_chunk(source)(_spread_of):
@@ -226,14 +225,14 @@ def _spread(source: Source) -> tuple[int, NDArray[np.float64], NDArray[np.float6
     return n, mean, np.sqrt(squares / n)
 
 
-def _spread_of(rows: Rows) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
+def _spread_of(rows: Singles) -> tuple[int, Floats, Floats]:
     """The number of the rows, their mean, and the sum of the squares about it."""
     values = rows.astype(np.float64)
     mean = values.mean(axis=0)
     return len(values), mean, np.square(values - mean).sum(axis=0)
 
 
-def _start(mean: NDArray[np.float64], deviation: NDArray[np.float64], size: int, rng: np.random.Generator) -> Rows:
+def _start(mean: Floats, deviation: Floats, size: int, rng: np.random.Generator) -> Singles:
     """Units on the plane of the first two coordinates, two deviations to either side, jittered."""
     lattice = np.zeros((size, size, len(mean)))
     steps = np.linspace(-2, 2, size) if size > 1 else np.zeros(1)
@@ -241,20 +240,18 @@ def _start(mean: NDArray[np.float64], deviation: NDArray[np.float64], size: int,
     if len(mean) > 1:
         lattice[..., 1] = steps
     lattice += _JITTER * rng.standard_normal(lattice.shape)
-    codebook: Rows = (mean + deviation * lattice).astype(np.float32).reshape(size * size, len(mean))
+    codebook: Singles = (mean + deviation * lattice).astype(np.float32).reshape(size * size, len(mean))
     return codebook
 
 
-def _unit_sums(rows: Rows, units: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+def _unit_sums(rows: Singles, units: Ints, count: int) -> Floats:
     """Per unit the sum (count, k) of its rows, added in their order."""
     mine = csc_array((np.ones(len(rows)), units, np.arange(len(rows) + 1)), shape=(count, len(rows)))
-    sums: NDArray[np.float64] = mine @ rows.astype(np.float64)
+    sums: Floats = mine @ rows.astype(np.float64)
     return sums
 
 
-def _smoothed(
-    sums: NDArray[np.float64], counts: NDArray[np.float64], codebook: Rows, width: float
-) -> NDArray[np.float32]:
+def _smoothed(sums: Floats, counts: Floats, codebook: Singles, width: float) -> Singles:
     """The batch rule: weighted means over the neighbourhood; a unit that hears of no frame stays where it is."""
     size = round(len(counts) ** 0.5)
     place = np.arange(size)
@@ -269,7 +266,7 @@ def _smoothed(
     return moved
 
 
-def _search(codes: Rows, units: Units, without: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+def _search(codes: Singles, units: Units, without: Ints | None = None) -> Ints:
     """The nearest unit of every row, by exact distance in float64, lowest index first; `without` (n,): not this one."""
     found = np.empty(len(codes), np.int64)
     for first in range(0, len(codes), CHUNK):
@@ -278,14 +275,14 @@ def _search(codes: Rows, units: Units, without: NDArray[np.int64] | None = None)
     return found
 
 
-def _search_chunk(codes: Rows, ready: Units, without: NDArray[np.int64] | None) -> NDArray[np.int64]:
+def _search_chunk(codes: Singles, ready: Units, without: Ints | None) -> Ints:
     """float32 products find the candidates; float64 decides where they are nearer to each other than rounding."""
-    scores: NDArray[np.float32] = codes @ ready.places.T
+    scores: Singles = codes @ ready.places.T
     scores -= ready.halves
     every = np.arange(len(codes))
     if without is not None:
         scores[every, without] = -np.inf
-    units: NDArray[np.int64] = scores.argmax(axis=1)
+    units: Ints = scores.argmax(axis=1)
     best = scores[every, units]
     reach = np.sqrt(np.square(codes, dtype=np.float64).sum(axis=1) * ready.largest) + ready.largest / 2
     bound = 2 * (codes.shape[1] + 2) * np.finfo(np.float32).eps * reach
@@ -303,7 +300,7 @@ def _search_chunk(codes: Rows, ready: Units, without: NDArray[np.int64] | None) 
     return units
 
 
-def distances(codes: Rows, codebook: Rows, units: NDArray[np.int64]) -> NDArray[np.float64]:
+def distances(codes: Singles, codebook: Singles, units: Ints) -> Floats:
     """Euclidean distance of every row to its unit, float64 (n,)."""
     distances = np.empty(len(codes))
     for first in range(0, len(codes), CHUNK):
@@ -331,7 +328,7 @@ class MapQuality:
     unseen: float
 
 
-def map_quality(source: Source, codebook: Rows, hits: NDArray[np.int64]) -> MapQuality:
+def map_quality(source: Source, codebook: Singles, hits: Ints) -> MapQuality:
     """The quality of a map (K, k) for coordinates (n, k), in one pass; `hits` (K,): the training frames per unit.
 
     Errors are rounded to 9 digits. Raises VisionError if there are no rows.
@@ -356,7 +353,7 @@ def map_quality(source: Source, codebook: Rows, hits: NDArray[np.int64]) -> MapQ
     )
 
 
-def _fall(codebook: Rows, rows: Rows) -> tuple[NDArray[np.int64], float, int]:
+def _fall(codebook: Singles, rows: Singles) -> tuple[Ints, float, int]:
     """How many rows each unit got (K,), the sum of their distances, and how many have their next unit elsewhere."""
     units, nearest = best_units(rows, codebook)
     apart = int(np.count_nonzero(torn(rows, codebook, units)))

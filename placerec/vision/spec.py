@@ -4,19 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
+from placerec.arrays import Singles
 from placerec.errors import VisionError
 from placerec.frames.sequence import Gray
 from placerec.vision.centrist import LENGTH, centrist
 from placerec.vision.exact import TERMS
-from placerec.vision.gist import VARIANTS, Floats, gist
+from placerec.vision.gist import VARIANTS, gist
 from placerec.vision.images import FITS, SMALLEST, check_gray, fit_image
-
-# Kind -> the settings that it has. `npy`: computed elsewhere, of a length that its file tells.
-SETTINGS = {
-    "gist": ("variant", "image_size", "fit"),
-    "centrist": ("image_size", "fit"),
-    "npy": ("columns",),
-}
 
 
 @dataclass(frozen=True)
@@ -35,10 +29,11 @@ class DescriptorSpec:
     columns: int = 0
 
     def __post_init__(self) -> None:
-        if self.kind not in tuple(SETTINGS):
-            raise VisionError(f"no descriptor is called {self.kind!r}; choose one of {', '.join(SETTINGS)}")
+        # As a tuple: what a file says may be of any type.
+        if self.kind not in tuple(KINDS):
+            raise VisionError(f"no descriptor is called {self.kind!r}; choose one of {', '.join(KINDS)}")
         for field in fields(self):
-            if field.name not in ("kind", *SETTINGS[self.kind]) and getattr(self, field.name) != field.default:
+            if field.name not in ("kind", *KINDS[self.kind].settings) and getattr(self, field.name) != field.default:
                 raise VisionError(f"{self.kind} descriptors have no {field.name}; leave it out")
         if self.variant not in VARIANTS:
             raise VisionError(f"no GIST variant is called {self.variant!r}; choose one of {', '.join(VARIANTS)}")
@@ -51,31 +46,51 @@ class DescriptorSpec:
 
     @property
     def length(self) -> int:
-        """The number of values of a descriptor; GIST's are 4 scales x 6 orientations x 4 x 4 blocks."""
-        return {"gist": 4 * 6 * 4 * 4, "centrist": LENGTH, "npy": self.columns}[self.kind]
+        """The number of values of a descriptor."""
+        return KINDS[self.kind].length or self.columns
 
     def as_dict(self) -> dict[str, Any]:
         """The kind and the settings that it has, as files hold them: `DescriptorSpec(**...)` is the way back."""
-        return {name: getattr(self, name) for name in ("kind", *SETTINGS[self.kind])}
+        return {name: getattr(self, name) for name in ("kind", *KINDS[self.kind].settings)}
 
 
-_ENGINES: dict[str, Callable[[Gray, DescriptorSpec], Floats]] = {
-    "gist": lambda gray, spec: gist(gray, variant=spec.variant),
-    "centrist": lambda gray, spec: centrist(gray),
+@dataclass(frozen=True)
+class Kind:
+    """A kind of descriptor: the settings of `DescriptorSpec` that it has, its number of values, and what makes it.
+
+    `describe`: makes it of the fitted image; None if it is computed elsewhere, and its file tells the length.
+    """
+
+    settings: tuple[str, ...]
+    length: int | None = None
+    describe: Callable[[Gray, DescriptorSpec], Singles] | None = None
+
+
+# Another descriptor is added here.
+KINDS = {
+    # 4 scales x 6 orientations x 4 x 4 blocks.
+    "gist": Kind(("variant", "image_size", "fit"), 4 * 6 * 4 * 4, lambda gray, spec: gist(gray, variant=spec.variant)),
+    "centrist": Kind(("image_size", "fit"), LENGTH, lambda gray, spec: centrist(gray)),
+    "npy": Kind(("columns",)),
 }
 
 
 def check_describes_images(spec: DescriptorSpec) -> None:
     """Raise VisionError if descriptors of this kind are not made from images here."""
-    if spec.kind not in _ENGINES:
+    _describer(spec)
+
+
+def descriptor(gray: Gray, spec: DescriptorSpec) -> Singles:
+    """The descriptor of one grey image (h, w) of 0..255: float32 (spec.length,), zeros if the image is constant."""
+    describe = _describer(spec)
+    return describe(fit_image(check_gray(gray), spec.image_size, spec.fit), spec)
+
+
+def _describer(spec: DescriptorSpec) -> Callable[[Gray, DescriptorSpec], Singles]:
+    describe = KINDS[spec.kind].describe
+    if describe is None:
         raise VisionError(
             f"the dictionary's descriptors ({spec.columns} values) were computed elsewhere, and images cannot be "
             "described so here; tokenize with --descriptor npy:FILE, and decode the token streams"
         )
-
-
-def descriptor(gray: Gray, spec: DescriptorSpec) -> Floats:
-    """The descriptor of one grey image (h, w) of 0..255: float32 (spec.length,), zeros if the image is constant."""
-    check_describes_images(spec)
-    gray = check_gray(gray)
-    return _ENGINES[spec.kind](fit_image(gray, spec.image_size, spec.fit), spec)
+    return describe

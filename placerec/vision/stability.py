@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import VisionError
 from placerec.frames import Frame, Sequence, all_images
 from placerec.frames.sequence import Gray
@@ -20,7 +21,7 @@ from placerec.vision.spec import DescriptorSpec, check_describes_images, descrip
 
 log = logging.getLogger(__name__)
 
-Words = NDArray[np.int64]
+Words = Ints
 
 # Frames whose descriptors are held at once: each has one a change.
 _CHUNK = 256
@@ -85,7 +86,7 @@ def word_changes(
     total = sum(len(sequence.frames) for sequence in sequences)
     words: list[Words] = []
     kept: list[int] = []
-    rows: list[NDArray[np.float32]] = []
+    rows: list[Singles] = []
     for number, (frame, image) in enumerate(chain.from_iterable(map(all_images, sequences))):
         described = _described(frame, image, dictionary.spec, np.random.Generator(np.random.PCG64([seed, number])))
         if described is not None:
@@ -103,7 +104,7 @@ def word_changes(
     return _compared(np.concatenate(words), sequence_of[1:] == sequence_of[:-1], dictionary.training.size)
 
 
-def _compared(words: Words, follows: NDArray[np.bool_], size: int) -> Stability:
+def _compared(words: Words, follows: Mask, size: int) -> Stability:
     """words (n, 1 + changes), the unchanged first; follows (n - 1,): whether the next row is of the same sequence."""
     results = []
     for column, change in enumerate(CHANGES, start=1):
@@ -122,9 +123,7 @@ def _shares(changed: int, neighbour: int, of: int) -> dict[str, float | None]:
     return {"changed": changed / of if of else None, "to_neighbour": neighbour / of if of else None}
 
 
-def _described(
-    frame: Frame, gray: Gray | str, spec: DescriptorSpec, rng: np.random.Generator
-) -> NDArray[np.float32] | None:
+def _described(frame: Frame, gray: Gray | str, spec: DescriptorSpec, rng: np.random.Generator) -> Singles | None:
     """Descriptors of a frame as it is and after each change, (1 + changes, d); None if it cannot be used."""
     if isinstance(gray, str):
         log.warning("%s; the frame is skipped", gray)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import SourceError, VisionError
 from placerec.files import content_digest
 from placerec.frames import Frame, read_gray
@@ -35,8 +36,8 @@ class BatchResult:
     none.
     """
 
-    kept: NDArray[np.int64]
-    blank: NDArray[np.bool_]
+    kept: Ints
+    blank: Mask
     reasons: tuple[str, ...]
     arrays: dict[str, NDArray[Any]]
 
@@ -93,7 +94,7 @@ def describe_batch(spec: DescriptorSpec, batch: Batch) -> BatchResult:
     return BatchResult(np.array(kept, np.int64), np.asarray(blank), tuple(reasons), {"values": values})
 
 
-def describe_frame(frame: Frame, image: Gray | str | None, spec: DescriptorSpec) -> NDArray[np.float32] | str:
+def describe_frame(frame: Frame, image: Gray | str | None, spec: DescriptorSpec) -> Singles | str:
     """A frame's descriptor, or the reason why there is none; `image`: None if it is still in its file."""
     if isinstance(image, str):
         return image

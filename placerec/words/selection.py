@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Mask
 from placerec.errors import StreamError, refuse_string
 
 
@@ -35,7 +35,7 @@ def parse_selection(text: str) -> Selection:
     )
 
 
-def select(words: Sequence[str], selection: Selection) -> NDArray[np.bool_]:
+def select(words: Sequence[str], selection: Selection) -> Mask:
     """Which of T consecutive words of one sequence are kept, bool (T,).
 
     `subsample`: positions 0, S, 2S... `unique`: the first word of every run of equal words. `compress`: of a run of L
@@ -43,7 +43,7 @@ def select(words: Sequence[str], selection: Selection) -> NDArray[np.bool_]:
     """
     refuse_string(words, StreamError)
     position = np.arange(len(words))
-    kept: NDArray[np.bool_]
+    kept: Mask
     if selection.kind == "none":
         return np.ones(len(words), bool)
     if selection.kind == "subsample":

@@ -8,8 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import StreamError, refuse_string
 from placerec.files import read_lines
 from placerec.words.selection import Selection, select
@@ -21,7 +21,7 @@ GAP_FACTOR = 10.0
 Sentences = list[list[str]]
 
 
-def time_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
+def time_gaps(times: Floats) -> Mask:
     """bool (n,): whether a frame follows a pause of more than GAP_FACTOR times the median time between frames."""
     steps = np.diff(times)
     known = steps[np.isfinite(steps) & (steps > 0)]
@@ -31,7 +31,7 @@ def time_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
     return gaps
 
 
-def continues(stream: WordStream) -> NDArray[np.bool_]:
+def continues(stream: WordStream) -> Mask:
     """bool (n,): whether a frame and the one before it are both labelled, with no gap in time between them."""
     labelled = stream.table.labelled
     continued = labelled & ~time_gaps(stream.times)
@@ -57,7 +57,7 @@ def visits(stream: WordStream, selection: Selection) -> list[tuple[str, list[str
     return found
 
 
-def place_steps(stream: WordStream, places: Sequence[str]) -> NDArray[np.int64]:
+def place_steps(stream: WordStream, places: Sequence[str]) -> Ints:
     """int64 (C, C): how often a frame at places[i] is followed by one at places[j].
 
     Counted between the frames that `continues` connects; `places` must hold every label of the stream.
@@ -68,7 +68,7 @@ def place_steps(stream: WordStream, places: Sequence[str]) -> NDArray[np.int64]:
     return steps.reshape(len(places), len(places))
 
 
-def place_triples(stream: WordStream, places: Sequence[str]) -> NDArray[np.int64]:
+def place_triples(stream: WordStream, places: Sequence[str]) -> Ints:
     """int64 (C, C, C): how often a visit to places[j] came from one to places[i] and led to one to places[k].
 
     The frames from one to the next are those that `continues` connects; `places` must hold every label of the stream.

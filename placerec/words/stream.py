@@ -17,8 +17,8 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats
 from placerec.errors import StreamError, at, refuse_string
 from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
@@ -40,7 +40,7 @@ class WordStream:
     name: str
     table: FrameTable
     words: tuple[str, ...]
-    distances: NDArray[np.float64]
+    distances: Floats
 
     @staticmethod
     def of(
@@ -49,8 +49,8 @@ class WordStream:
         places: Sequence[str] | None = None,
         *,
         frames: Iterable[str] | None = None,
-        times: Sequence[float] | NDArray[np.float64] | None = None,
-        distances: Sequence[float] | NDArray[np.float64] | None = None,
+        times: Sequence[float] | Floats | None = None,
+        distances: Sequence[float] | Floats | None = None,
     ) -> "WordStream":
         """A stream from columns, as another tokeniser makes it.
 
@@ -89,7 +89,7 @@ class WordStream:
         return tuple(self.table.names)
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """Seconds, float64 (n,), nan where unknown."""
         return self.table.times
 
@@ -172,7 +172,7 @@ def check_word(path: Path | str, line: int, word: str) -> str:
     return word
 
 
-def _numbers(path: Path, lines: Iterable[int], title: str, texts: Sequence[str]) -> NDArray[np.float64]:
+def _numbers(path: Path, lines: Iterable[int], title: str, texts: Sequence[str]) -> Floats:
     numbers = np.full(len(texts), np.nan)
     for row, (i, text) in enumerate(zip(lines, texts, strict=True)):
         try:
