@@ -1,6 +1,5 @@
 """What can go wrong for a reason that the user can mend: one class per room, one base for the border to catch."""
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -70,6 +69,9 @@ def check_optional(module: str, purpose: str, instead: str = "") -> None:
 
     To be called before any work, and not where the package is used at the end of it. `instead`: another remedy.
     """
+    # Errors are known to whatever starts, which is to be quick.
+    from importlib.util import find_spec
+
     package, remedy = _OPTIONAL[module]
     try:
         found = find_spec(module) is not None

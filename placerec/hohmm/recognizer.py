@@ -23,7 +23,7 @@ from placerec.hohmm.online import OnlineFilter
 from placerec.hohmm.transitions import Transition, fixed_transition
 from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
-from placerec.lm.union import unite_models
+from placerec.lm.backoff import unite_models
 from placerec.words import Selection, WordStream
 
 if TYPE_CHECKING:

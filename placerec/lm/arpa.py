@@ -23,7 +23,7 @@ from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text, write_text
 from placerec.lm.arpa_text import LOG_ZERO, first_lines
-from placerec.lm.backoff import BackoffModel, score_ids
+from placerec.lm.backoff import BackoffModel
 from placerec.lm.trie import Trie, Vocabulary
 
 log = logging.getLogger(__name__)
@@ -261,7 +261,7 @@ class _Reader:
         if (prefix < 0).any():
             raise self.error("the context of an n-gram is missing at two orders", line)
         trie = model.trie
-        log10_p = np.array([score_ids(model, ngram)[0][-1] for ngram in numbers], np.float32)
+        log10_p = np.array([model.tables.score(ngram)[-1] for ngram in numbers], np.float32)
         shorter = BackoffModel(Trie(trie.vocabulary, trie.keys[:-1]), model.log10_ps[:-1], model.backoffs[:-1])
         return _with_order(
             shorter,

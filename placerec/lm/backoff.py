@@ -1,12 +1,14 @@
-"""The back-off model: a log10 probability for each listed n-gram, a backoff weight for each listed context."""
+"""Back-off models: a log10 probability for each listed n-gram, a backoff weight for each listed context."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
-from placerec.lm.trie import Trie
+from placerec.lm.score import Ngrams, ScoreTables, build_tables
+from placerec.lm.trie import Trie, Vocabulary, runs
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,9 @@ class BackoffModel:
     def score(self, words: Sequence[str]) -> Floats:
         """log10 p float64 (T,) of each of T words after those before it: empty first context, no markers.
 
-        The sum over a sequence is its log10 probability. Vectorised: one binary search per order for all words.
+        The sum over a sequence is its log10 probability.
         """
-        return score_ids(self, self.ids(words))[0]
+        return self.tables.score(self.ids(words))
 
     def ids(self, words: Sequence[str]) -> Ints:
         """Word numbers int64 (T,); `<unk>`'s, or -1 if it is not listed, for words that are not listed."""
@@ -54,21 +56,88 @@ class BackoffModel:
         ids[ids < 0] = self.trie.vocabulary.index.get("<unk>", -1)
         return ids
 
+    @cached_property
+    def tables(self) -> ScoreTables:
+        """The tables that give words their probability."""
+        columns = zip(self.log10_ps, map(float_weights, self.backoffs), self.backoffs, strict=True)
+        orders = [
+            [Ngrams(self.trie.matrix(n), log10_p.astype(np.float64), weight, ~np.isnan(backoff))]
+            for n, (log10_p, weight, backoff) in enumerate(columns, start=1)
+        ]
+        return build_tables(len(self.words), orders)
 
-def score_ids(model: BackoffModel, ids: Ints) -> tuple[Floats, Ints]:
-    """log10 p float64 (T,) and the order that answered int64 (T,) (0: not even a unigram) for word numbers (T,)."""
-    rows = ids
-    log10_p = np.where(ids >= 0, model.log10_ps[0].astype(np.float64)[ids], -np.inf) if len(ids) else np.zeros(0)
-    answered = (ids >= 0).astype(np.int64)
-    for n in range(2, model.order + 1):
-        # The (n-1)-gram that ends one word earlier is the context.
-        context = np.full(len(rows), -1, np.int64)
-        context[1:] = rows[:-1]
-        rows = model.trie.find(n, context, ids)
-        listed, known = rows >= 0, context >= 0
-        backoff = np.zeros(len(rows))
-        backoff[known] = np.nan_to_num(model.backoffs[n - 2][context[known]].astype(np.float64), neginf=-np.inf)
-        log10_p = log10_p + backoff
-        log10_p[listed] = model.log10_ps[n - 1][rows[listed]]
-        answered[listed] = n
-    return log10_p, answered
+
+def float_weights(backoff: Singles) -> Floats:
+    """log10 weights float64 (m,) of a model's `backoffs`: 0 for what is no context."""
+    return np.where(np.isnan(backoff), 0.0, backoff.astype(np.float64))
+
+
+@dataclass(frozen=True)
+class ModelUnion:
+    """C models over the n-grams of all of them; make one with `unite_models`. `index`: the numbers of their words.
+
+    The numbers are those of `BackoffModel.score`, to the last bit: the same float64 sums in the same order.
+    """
+
+    index: Mapping[str, int] = field(repr=False)
+    tables: ScoreTables = field(repr=False)
+
+    def score(self, words: Sequence[str]) -> Floats:
+        """log10 p float64 (T, C) of each of T words after those before it: empty first context, no markers.
+
+        Raises KeyError for a word that is not listed.
+        """
+        return self.tables.score(np.fromiter(map(self.index.__getitem__, words), np.int64, len(words)))
+
+    def follow(self) -> Callable[[str], list[float]]:
+        """A function to be asked for each word of a text in turn: its C values of `score`; KeyError as there.
+
+        Constant memory: it remembers where the last N-1 words stand.
+        """
+        return self.tables.follow(self.index)
+
+
+def unite_models(models: Sequence[BackoffModel]) -> ModelUnion:
+    """C models as one: a look-up answers for all of them; a word that a model does not list has -inf under it."""
+    trie = _united([model.trie.with_endings() for model in models])
+    log10_p, weights = _columns(trie, models)
+    for n in range(2, trie.order + 1):
+        # By back-off where a model does not list an n-gram.
+        lower = log10_p[n - 2][trie.suffixes[n - 1]] + weights[n - 2][trie.prefix(n)]
+        log10_p[n - 1] = np.where(np.isnan(log10_p[n - 1]), lower, log10_p[n - 1])
+    orders = [
+        [Ngrams(trie.matrix(n), p, weight, np.ones(len(p), bool))]
+        for n, (p, weight) in enumerate(zip(log10_p, weights, strict=True), start=1)
+    ]
+    return ModelUnion(trie.vocabulary.index, build_tables(len(trie.vocabulary), orders))
+
+
+def _united(tries: Sequence[Trie]) -> Trie:
+    """The trie of all n-grams of all `tries`."""
+    vocabulary = Vocabulary.of(word for trie in tries for word in trie.vocabulary.words)
+    words = [vocabulary.ids(trie.vocabulary.words) for trie in tries]
+    keys, rows = [np.arange(len(vocabulary))], words
+    for n in range(2, max(trie.order for trie in tries) + 1):
+        # Numbers grow in the order of the text in every trie, so that each one's keys stay sorted.
+        wanted = [
+            row[trie.prefix(n)] * len(vocabulary) + word[trie.word(n)] if n <= trie.order else np.zeros(0, np.int64)
+            for trie, word, row in zip(tries, words, rows, strict=True)
+        ]
+        keys.append(runs(np.sort(np.concatenate(wanted)))[0])
+        rows = [np.searchsorted(keys[-1], key) for key in wanted]
+    return Trie(vocabulary, tuple(keys))
+
+
+def _columns(trie: Trie, models: Sequence[BackoffModel]) -> tuple[list[Floats], list[Floats]]:
+    """Per order (m_n, C): the log10 p that models list, nan where they do not (-inf for words); backoff weights."""
+    log10_p = [np.full((len(keys), len(models)), np.nan) for keys in trie.keys]
+    weights = [np.zeros((len(keys), len(models))) for keys in trie.keys]
+    log10_p[0][:] = -np.inf
+    for c, model in enumerate(models):
+        word = row = trie.vocabulary.ids(model.words)
+        for n in range(1, model.order + 1):
+            if n > 1:
+                row = trie.find(n, row[model.trie.prefix(n)], word[model.trie.word(n)])
+            log10_p[n - 1][row, c] = model.log10_ps[n - 1]
+            weights[n - 1][row, c] = float_weights(model.backoffs[n - 1])
+    return log10_p, weights

@@ -11,10 +11,10 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.gather import trie_of
 from placerec.lm.logs import EPSILON, log10, p_of
+from placerec.lm.score import Ngrams, ScoreTables, build_tables
 from placerec.lm.trace import Trace
-from placerec.lm.trie import Trie, Vocabulary, build_trie, endings, per_context
+from placerec.lm.trie import Trie, Vocabulary, closed_trie, per_context
 
 
 @dataclass
@@ -80,6 +80,16 @@ class Draft:
                 shorter[self.trie.suffixes[k - 1][rows]] = True
                 rows = np.flatnonzero(shorter)
 
+    def tables(self, numbers: Ints, size: int) -> ScoreTables:
+        """The tables that give words their probability: words are `numbers` (V,) there, below `size`."""
+        orders = [
+            [Ngrams(numbers[self.trie.matrix(n)], log10_p, backoff, node, stored)]
+            for n, (log10_p, backoff, node, stored) in enumerate(
+                zip(self.log10_p, self.backoff, self.node, self.stored, strict=True), start=1
+            )
+        ]
+        return build_tables(size, orders)
+
     def model(self) -> BackoffModel:
         """The model without the rows that hold nothing; the prefixes of what is stored must be stored."""
         backoffs = [
@@ -100,11 +110,7 @@ def drafts_of(models: Sequence[BackoffModel], non_events: Sequence[str], words: 
 
 
 def _draft_of(model: BackoffModel) -> Draft:
-    trie = model.trie
-    if not trie.closed:
-        groups = [trie.matrix(n) for n in range(1, trie.order + 1)]
-        ends = [end for group in groups for end in endings(group)]
-        trie, _ = build_trie(trie.vocabulary, trie.order, [*groups, *ends])
+    trie = model.trie.with_endings()
     draft = Draft(trie, np.ones(len(trie.vocabulary), bool))
     rows = np.arange(len(trie.vocabulary))
     for n in range(1, model.order + 1):
@@ -129,7 +135,7 @@ def unite(drafts: Sequence[Draft], vocabulary: Vocabulary, event: Mask, names: I
     for draft in drafts:
         renumbered = vocabulary.ids(draft.trie.vocabulary.words)
         groups += [renumbered[draft.trie.matrix(n)] for n in range(1, draft.order + 1)]
-    trie, rows = trie_of(vocabulary, order, groups)
+    trie, rows = closed_trie(vocabulary, order, groups)
     united, place = [], iter(rows)
     for draft in drafts:
         wider = Draft(trie, event) if names is None else Draft(trie, event, names)

@@ -71,7 +71,7 @@ class Cache:
         shares: Floats = np.where(words >= 0, held, 0) / np.maximum(1, self.stop - self.start)
         return shares
 
-    def spread(self, t: int, size: int) -> Floats:
+    def distribution(self, t: int, size: int) -> Floats:
         """The share of each of `size` words in the cache at word `t`, float64 (size,)."""
         recent = self.words[self.start[t] : self.stop[t]]
         return np.bincount(recent, minlength=size)[:size] / max(1, len(recent))

@@ -13,6 +13,7 @@ from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.checks import context_sums, power_of_ten
 from placerec.lm.markers import SENTENCE_START
+from placerec.lm.score import Contexts
 
 
 def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5) -> dict[str, Any]:
@@ -66,29 +67,29 @@ def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:
         if word not in model:
             raise LanguageModelError(f"the word {word!r} is not in the model")
     *history, word = words
-    history = history[len(history) - model.order + 1 :] if len(history) >= model.order else history
+    history = history[max(0, len(history) - model.order + 1) :]
+    tables, ids = model.tables, model.ids([*history, word])
+    digits = tables.digits(ids)
+    contexts = Contexts(tables, digits, np.zeros(1, np.int64))
+    log10_p, answered = tables.find(contexts, digits)
+    found = int(answered[-1])
     steps: list[dict[str, Any]] = []
-    for start in range(len(history) + 1):
-        context = history[start:]
-        row = _row(model, [*context, word])
-        n = len(context) + 1
-        if row >= 0:
-            log10_p = float(model.log10_ps[n - 1][row])
-            steps.append({"ngram": " ".join([*context, word]), "found": True, "log10_p": _finite(log10_p)})
-            break
-        at = _row(model, context)
-        weight = float(model.backoffs[n - 2][at]) if at >= 0 else math.nan
-        known = not math.isnan(weight)
+    for k in range(len(history), found - 1, -1):
+        context, table = history[len(history) - k :], tables.tables[k - 1]
+        row = table.rows.find(contexts.codes[k][-1:])[0]
         steps.append(
             {
                 "ngram": " ".join([*context, word]),
                 "found": False,
                 "context": " ".join(context),
-                "context_listed": known,
-                "log10_backoff": _finite(weight) if known else 0.0,
+                "context_listed": bool(table.is_context[row]),
+                "log10_backoff": _finite(float(table.backoff[row])),
             }
         )
-    total = model.log10_p(word, history)
+    listed = float(tables.find(contexts, digits, found)[0][-1])
+    ngram = " ".join([*history, word][-found:])
+    steps.append({"ngram": ngram, "found": True, "log10_p": _finite(listed)})
+    total = float(log10_p[-1])
     return {"word": word, "history": history, "log10_p": _finite(total), "p": power_of_ten(total), "steps": steps}
 
 
@@ -128,13 +129,6 @@ def _explanation(explained: dict[str, Any]) -> list[str]:
             lines.append(f"  {step['ngram']!r} is not listed, nor is its context {step['context']!r}: nothing to pay")
     lines.append(f"  log10 p = {' + '.join(terms)} = {_show(explained['log10_p'])}, p = {explained['p']:.7g}")
     return lines
-
-
-def _row(model: BackoffModel, words: Sequence[str]) -> int:
-    row = np.zeros(1, np.int64)
-    for n, number in enumerate(model.ids(words), start=1):
-        row = model.trie.find(n, row, np.array([number]))
-    return int(row[0])
 
 
 def _comment(path: Path | str) -> str:

@@ -5,12 +5,11 @@ Sections 11.2 and 11.3 of our SRILM specification.
 
 import numpy as np
 
-from placerec.arrays import Floats, Ints
+from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.draft import Draft, context_masses, drafts_of, insert_prefixes, reweigh, settle_masses
 from placerec.lm.logs import EPSILON, LN10, p_of
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
-from placerec.lm.passage import joint_of_rows
 from placerec.lm.trace import SILENT, Trace
 
 
@@ -68,7 +67,7 @@ def _try(
     """Which of `rows`, n-grams of the contexts `contexts[group]`, can go."""
     vocabulary = draft.trie.vocabulary.index
     start, end = vocabulary.get(SENTENCE_START, -1), vocabulary.get(SENTENCE_END, -1)
-    context = joint_of_rows(history, n - 1, start=start, end=end)[contexts][group]
+    context = joint_log10_p(history, n - 1, start=start, end=end)[contexts][group]
     old = draft.log10_p[n - 1][rows]
     shorter = draft.backed_off(n - 1)[draft.trie.suffixes[n - 1][rows]]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -80,6 +79,22 @@ def _try(
         gone = (np.exp(entropy * LN10) - 1 < threshold) & ~draft.node[n - 1][rows]
     trace.trials(n, rows, context, old, new, entropy, gone)
     return rows[gone]
+
+
+def joint_log10_p(draft: Draft, n: int, *, start: int, end: int) -> Singles:
+    """log10 of the joint probability of the words of every row of order n, float32 (m_n,); as `score.joint_log10_p`.
+
+    `start` and `end` are the word numbers of <s> and </s>, -1 if not listed; the backed-off values must be fresh.
+    """
+    single = draft.log10_p[0]
+    total = np.where(np.isneginf(single) & ~draft.event, np.float32(0), single)
+    if start >= 0:
+        total[start] = single[end] if end >= 0 else -np.inf
+    for k in range(2, n + 1):
+        value = draft.backed_off(k)
+        silent = ~draft.event[draft.trie.word(k)]
+        total = total[draft.trie.prefix(k)] + np.where(np.isneginf(value) & silent, np.float32(0), value)
+    return total
 
 
 def _forget_contexts(draft: Draft, n: int, contexts: Ints) -> None:

@@ -1,11 +1,14 @@
 """Where numbers stand in an array: a hash table, for many questions to one array."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Ints
 
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)
+_INVERSE = np.uint64(pow(int(_FACTOR), -1, 1 << 64))
 # Slots for each key, up to so many bits: where that is still in a cache, more room leaves fewer keys to one slot.
 _ROOM = (2, 64), (4, 19), (32, 15)
 
@@ -53,3 +56,32 @@ class RowIndex:
             again = self._rest.find(wanted[missed])
             found[missed] = np.where(again >= 0, self._lost[again], -1)
         return found
+
+    def finder(self) -> Callable[[int], int]:
+        """A function that finds the place of one number >= 0 at a time, sooner than arrays of one are made."""
+        slots, size, shift, width = self._slots.data, self._size, int(self._shift), int(self._width)
+        factor, bits, contested, lost = int(_FACTOR), (1 << 64) - 1, self._contested.data, self._lost.data
+        find_lost = None if self._rest is None else self._rest.finder()
+
+        def find(wanted: int) -> int:
+            mixed = wanted * factor & bits
+            slot = mixed >> shift
+            place: int = slots[slot] ^ (mixed << width & bits)
+            if place < size:
+                return place
+            if find_lost is not None and contested[slot] and (again := find_lost(wanted)) >= 0:
+                return lost[again]
+            return -1
+
+        return find
+
+    def keys(self) -> Ints:
+        """The numbers again, int64 (m,), if they are `distinct`: the slots hold all of each, so that none is stored."""
+        keys = np.empty(self._size, np.int64)
+        place = self._slots & ((np.uint64(1) << self._width) - np.uint64(1))
+        slot = np.flatnonzero(place < self._size)
+        mixed = slot.view(np.uint64) << self._shift | self._slots[slot] >> self._width
+        keys[place[slot].view(np.int64)] = (mixed * _INVERSE).view(np.int64)
+        if self._rest is not None:
+            keys[self._lost] = self._rest.keys()
+        return keys

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Mask
+from placerec.lm.row_index import RowIndex
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,12 @@ class Trie:
         """Whether every n-gram without its first word is listed too."""
         return all(bool((rows >= 0).all()) for rows in self.suffixes)
 
+    def with_endings(self) -> "Trie":
+        """The trie of these n-grams and all their endings."""
+        if self.closed:
+            return self
+        return closed_trie(self.vocabulary, self.order, [self.matrix(n) for n in range(1, self.order + 1)])[0]
+
     def matrix(self, n: int) -> Ints:
         """The word numbers of the n-grams of order n, int64 (m_n, n)."""
         numbers = np.empty((len(self.keys[n - 1]), n), np.int64)
@@ -169,3 +176,32 @@ def build_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tu
 def endings(ngrams: Ints) -> list[Ints]:
     """The n-grams without their first word, without their first two, ...: matrices (m, n-1), ..., (m, 1)."""
     return [ngrams[:, start:] for start in range(1, ngrams.shape[1])]
+
+
+def closed_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tuple[Trie, list[list[Ints]]]:
+    """The trie of n-grams, each group a matrix of word numbers int64 (m, n), of their prefixes and of their endings.
+
+    Also the rows int64 (m,) of every group's n-grams' prefixes: of length 1, 2, ..., n.
+    """
+    trie, rows = _complete_trie(vocabulary, order, ngrams) or build_trie(vocabulary, order, ngrams)
+    if not trie.closed:
+        trie, rows = build_trie(vocabulary, order, [*ngrams, *(end for group in ngrams for end in endings(group))])
+    return trie, rows[: len(ngrams)]
+
+
+def _complete_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tuple[Trie, list[list[Ints]]] | None:
+    """The trie of n-grams and the rows of their prefixes, if every prefix is an n-gram of its own; else None."""
+    keys = [np.arange(len(vocabulary))]
+    rows = [[matrix[:, 0]] for matrix in ngrams]
+    for n in range(2, order + 1):
+        wide = [i for i, matrix in enumerate(ngrams) if matrix.shape[1] >= n]
+        wanted = [rows[i][-1] * len(vocabulary) + ngrams[i][:, n - 1] for i in wide]
+        own = [key for i, key in zip(wide, wanted, strict=True) if ngrams[i].shape[1] == n]
+        listed = runs(np.sort(np.concatenate(own)))[0] if own else np.zeros(0, np.int64)
+        index = RowIndex(listed)
+        keys.append(listed)
+        for i, key in zip(wide, wanted, strict=True):
+            rows[i].append(index.find(key))
+            if (rows[i][-1] < 0).any():
+                return None
+    return Trie(vocabulary, tuple(keys)), rows

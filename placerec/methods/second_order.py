@@ -17,7 +17,7 @@ import numpy as np
 
 from placerec.errors import ModelError
 from placerec.hohmm import learned_transition
-from placerec.lm.union import unite_models
+from placerec.lm.backoff import unite_models
 from placerec.methods.training_set import Floats, MakeStepper, StepFunction, TrainingSet
 
 

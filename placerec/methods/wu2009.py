@@ -13,7 +13,7 @@ import numpy as np
 
 from placerec.hohmm import Emissions
 from placerec.lm import BackoffModel, count_ngrams
-from placerec.lm.union import unite_models
+from placerec.lm.backoff import unite_models
 from placerec.methods.training_set import TrainingSet
 from placerec.model import ModelOptions, estimate_place
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from placerec.arrays import Ints
 from placerec.lm.draft import Draft
-from placerec.lm.gather import trie_of
+from placerec.lm.score import ScoreTables
+from placerec.lm.trie import closed_trie
 from placerec.srilm.arpa_block import Block
 from placerec.srilm.arpa_reader import Reader
 from placerec.srilm.context_order import NEVER, ContextTimes
@@ -46,7 +47,7 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[Draft, ContextTimes]:
     sorted_number = np.array(renumbered, np.int64)
     blocks = [(n, block) for n, its in sorted(reader.blocks.items()) for block in its]
     groups = [sorted_number[block.words] for _, block in blocks]
-    trie, rows = trie_of(vocabulary, reader.order, groups)
+    trie, rows = closed_trie(vocabulary, reader.order, groups)
     names = np.array(reader.words.names(vocabulary), np.int64)
     draft = Draft(trie, ~vocabulary.mask(reader.words.non_events), names)
     created = _weights(draft, blocks, rows)
@@ -67,6 +68,16 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[Draft, ContextTimes]:
     numbers = np.full(len(vocabulary), -1, np.int64)
     numbers[sorted_number[sorted_number >= 0]] = np.flatnonzero(sorted_number >= 0)
     return draft, ContextTimes(trie, created, numbers, expected)
+
+
+def tables_of(draft: Draft, words: WordList) -> ScoreTables:
+    """The tables that give words, by SRILM's number, the probabilities of a model."""
+    index = draft.trie.vocabulary.index
+    numbers = np.full(len(index), -1)
+    for number, word in enumerate(words.words):
+        if word in index:
+            numbers[index[word]] = number
+    return draft.tables(numbers, len(words.words))
 
 
 def _weights(draft: Draft, blocks: Sequence[tuple[int, Block]], rows: Sequence[Sequence[Ints]]) -> list[Ints]:

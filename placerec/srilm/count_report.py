@@ -7,8 +7,8 @@ import numpy as np
 from placerec.arrays import Floats, Ints
 from placerec.lm.logs import p_of
 from placerec.lm.markers import SENTENCE_END
-from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals
+from placerec.lm.score import TokenSequence
 from placerec.srilm.counts_file import MALFORMED, MOST_TOKENS, parse_count
 from placerec.srilm.report import RANKS, TOKENS, Printer, block
 from placerec.srilm.scorers import ModelView, Scorer
@@ -89,9 +89,9 @@ def _score(ngrams: Ints, counts: Floats, scorer: Scorer, printer: Printer, count
     m, n = ngrams.shape
     # A word more behind each n-gram: the joint probability of what stands before it is the n-gram's.
     behind = np.full((m, 1), printer.words.index[printer.words.unknown])
-    passage = Passage.of_rows(np.concatenate([ngrams, behind], axis=1))
-    passage = passage._replace(scored=passage.place == n - 1)
-    view = scorer.view(passage)
+    sequence = TokenSequence.of_rows(np.concatenate([ngrams, behind], axis=1))
+    sequence = sequence._replace(scored=sequence.place == n - 1)
+    view = scorer.view(sequence)
     scored = view.score()
     weights = counts
     if counting.entropy and isinstance(view, ModelView):

@@ -8,7 +8,7 @@ import numpy as np
 from placerec.arrays import Ints, Singles
 from placerec.lm.dynamic import Cache, loglinear, mixed, posteriors, with_cache
 from placerec.lm.logs import p_of
-from placerec.lm.passage import Passage, used_context
+from placerec.lm.score import TokenSequence
 from placerec.srilm.scorers import Model, ModelView, Scored, Scorer, View, event_numbers
 from placerec.srilm.vocabulary import WordList
 
@@ -26,18 +26,18 @@ class Mixture:
     scale: float = 1.0
     detailed: bool = False
 
-    def view(self, passage: Passage) -> "MixtureView":
-        """Read a passage."""
-        return MixtureView(self, [model.view(passage) for model in self.models])
+    def view(self, sequence: TokenSequence) -> "MixtureView":
+        """Read a token sequence."""
+        return MixtureView(self, [model.view(sequence) for model in self.models])
 
 
 class MixtureView:
-    """A passage, read by the models of a Mixture."""
+    """A token sequence, read by the models of a Mixture."""
 
     def __init__(self, mixture: Mixture, views: Sequence[ModelView]) -> None:
         self.mixture = mixture
         self.views = views
-        T = len(views[0].passage.ids)
+        T = len(views[0].digits)
         if mixture.length > 0:
             joints = np.stack([view.joint(mixture.length) for view in views])
             self.posteriors = posteriors(mixture.weights, joints, mixture.scale)
@@ -46,7 +46,7 @@ class MixtureView:
             self.posteriors = np.repeat(plain[:, None] / plain.sum(), T, axis=1)
 
     def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
+        """The probabilities of the sequence's words, or of others in their places."""
         parts = [view.score(words) for view in self.views]
         log10_ps = np.stack([part.log10_p for part in parts])
 
@@ -60,9 +60,9 @@ class MixtureView:
 
         return Scored(mixed(log10_ps, self.posteriors), tag)
 
-    def spread(self, t: int) -> Singles:
+    def distribution(self, t: int) -> Singles:
         """log10 p of every word."""
-        return mixed(np.stack([view.spread(t) for view in self.views]), self.posteriors[:, t])
+        return mixed(np.stack([view.distribution(t) for view in self.views]), self.posteriors[:, t])
 
 
 @dataclass(frozen=True)
@@ -73,28 +73,28 @@ class LogLinear:
     weights: Sequence[float]
     words: WordList
 
-    def view(self, passage: Passage) -> "LogLinearView":
-        """Read a passage."""
-        return LogLinearView(self, passage, [model.view(passage) for model in self.models])
+    def view(self, sequence: TokenSequence) -> "LogLinearView":
+        """Read a token sequence."""
+        return LogLinearView(self, sequence, [model.view(sequence) for model in self.models])
 
 
 class LogLinearView:
-    """A passage, read by the models of a LogLinear; normalisers are kept per context."""
+    """A token sequence, read by the models of a LogLinear; normalisers are kept per context."""
 
-    def __init__(self, mixture: LogLinear, passage: Passage, views: Sequence[ModelView]) -> None:
+    def __init__(self, mixture: LogLinear, sequence: TokenSequence, views: Sequence[ModelView]) -> None:
         self.mixture = mixture
-        self.passage = passage
+        self.sequence = sequence
         self.views = views
         self.events = event_numbers(mixture.words)
-        self.used = np.max([used_context(view.reading) for view in views], axis=0)
+        self.used = np.max([view.contexts.lengths for view in views], axis=0)
         self.sums: dict[tuple[int, ...], float] = {}
 
     def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
+        """The probabilities of the sequence's words, or of others in their places."""
         parts = [view.score(words) for view in self.views]
         log10_p = loglinear(np.stack([part.log10_p for part in parts]), self.mixture.weights)
         tags: dict[int, str] = {}
-        for t in np.flatnonzero(self.passage.scored).tolist():
+        for t in np.flatnonzero(self.sequence.scored).tolist():
             known = self.context(t) in self.sums
             total = self.total(t)
             log_total = np.float32(np.log10(total)) if total > 0 else np.float32(-np.inf)
@@ -111,7 +111,7 @@ class LogLinearView:
 
     def context(self, t: int) -> tuple[int, ...]:
         """The words before word t that any of the models uses."""
-        return tuple(self.passage.ids[t - int(self.used[t]) : t].tolist())
+        return tuple(self.sequence.ids[t - int(self.used[t]) : t].tolist())
 
     def total(self, t: int) -> float:
         """The sum over all words that the products at word t are divided by."""
@@ -120,13 +120,13 @@ class LogLinearView:
             self.sums[context] = float(p_of(self._products(t)[self.events]).sum())
         return self.sums[context]
 
-    def spread(self, t: int) -> Singles:
+    def distribution(self, t: int) -> Singles:
         """log10 p of every word."""
         with np.errstate(divide="ignore"):
             return self._products(t) - np.float32(np.log10(self.total(t)))
 
     def _products(self, t: int) -> Singles:
-        return loglinear(np.stack([view.spread(t) for view in self.views]), self.mixture.weights)
+        return loglinear(np.stack([view.distribution(t) for view in self.views]), self.mixture.weights)
 
 
 @dataclass(frozen=True)
@@ -138,23 +138,23 @@ class Cached:
     size: int
     weight: float
 
-    def view(self, passage: Passage) -> "CachedView":
-        """Read a passage."""
-        return CachedView(self, passage)
+    def view(self, sequence: TokenSequence) -> "CachedView":
+        """Read a token sequence."""
+        return CachedView(self, sequence)
 
 
 class CachedView:
-    """A passage, read by what is below the cache; the cache holds what stands before each word."""
+    """A token sequence, read by what is below the cache; the cache holds what stands before each word."""
 
-    def __init__(self, cached: Cached, passage: Passage) -> None:
+    def __init__(self, cached: Cached, sequence: TokenSequence) -> None:
         self.cached = cached
-        self.ids = passage.ids
-        self.base = cached.base.view(passage)
-        counted = passage.scored & (passage.ids != cached.words.index[cached.words.unknown])
-        self.cache = Cache(passage.ids, counted, cached.size)
+        self.ids = sequence.ids
+        self.base = cached.base.view(sequence)
+        counted = sequence.scored & (sequence.ids != cached.words.index[cached.words.unknown])
+        self.cache = Cache(sequence.ids, counted, cached.size)
 
     def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
+        """The probabilities of the sequence's words, or of others in their places."""
         below = self.base.score(words)
         unknown = self.cached.words.index[self.cached.words.unknown]
         ids = self.ids if words is None else words
@@ -162,10 +162,10 @@ class CachedView:
         log10_p = with_cache(below.log10_p, shares, self.cached.weight)
         return Scored(log10_p, lambda t: below.tag(t) + (f"[cache={shares[t]:.7g}]" if ids[t] != unknown else ""))
 
-    def spread(self, t: int) -> Singles:
+    def distribution(self, t: int) -> Singles:
         """log10 p of every word."""
-        below = self.base.spread(t)
-        return with_cache(below, self.cache.spread(t, len(below)), self.cached.weight)
+        below = self.base.distribution(t)
+        return with_cache(below, self.cache.distribution(t, len(below)), self.cached.weight)
 
 
 @dataclass(frozen=True)
@@ -179,21 +179,21 @@ class Lenient:
     unknown_p: float | None = None
     stand_in: int | None = None
 
-    def view(self, passage: Passage) -> "LenientView":
-        """Read a passage."""
-        return LenientView(self, passage.ids, self.base.view(passage))
+    def view(self, sequence: TokenSequence) -> "LenientView":
+        """Read a token sequence."""
+        return LenientView(self, sequence.ids, self.base.view(sequence))
 
 
 @dataclass(frozen=True)
 class LenientView:
-    """A passage, read by the scorer below."""
+    """A token sequence, read by the scorer below."""
 
     lenient: Lenient
     ids: Ints
     base: View
 
     def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
+        """The probabilities of the sequence's words, or of others in their places."""
         below = self.base.score(words)
         ids = self.ids if words is None else words
         log10_p = self._with_unknown(below.log10_p, ids)
@@ -207,9 +207,9 @@ class LenientView:
             lambda t: below.tag(t) + (other.tag(t) if instead[t] else ""),
         )
 
-    def spread(self, t: int) -> Singles:
+    def distribution(self, t: int) -> Singles:
         """log10 p of every word."""
-        below = self.base.spread(t)
+        below = self.base.distribution(t)
         log10_p = self._with_unknown(below, np.arange(len(below)))
         stand_in = self.lenient.stand_in
         return log10_p if stand_in is None else np.where(np.isneginf(log10_p), below[stand_in], log10_p)

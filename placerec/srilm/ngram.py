@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from placerec.arrays import Singles
-from placerec.lm.lookup import Lookup
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
-from placerec.lm.passage import Passage
-from placerec.srilm.arpa_lookup import read_lookup
+from placerec.lm.score import TokenSequence
+from placerec.srilm.arpa_lookup import read_tables
 from placerec.srilm.ngram_options import OPTIONS
 from placerec.srilm.options import Parsed, parse
 from placerec.srilm.report import TOKENS, Printer, print_perplexity
-from placerec.srilm.scorers import LookupModel, Model, Scorer, event_mask
+from placerec.srilm.scorers import Model, Scorer, event_mask
 from placerec.srilm.sentences import Handling
 from placerec.srilm.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.vocabulary import PAUSE, WordList, format_words, read_aliases, read_words
@@ -82,7 +81,7 @@ class _Run:
     def scorer(self) -> Scorer:
         """The model of -lm, which is only asked for probabilities."""
         options = self.options
-        model = read_lookup(
+        tables = read_tables(
             options["lm"],
             self.words,
             self.streams,
@@ -90,7 +89,7 @@ class _Run:
             debug=options["debug"],
             limited=options["limit-vocab"],
         )
-        return LookupModel(model, self.words) if isinstance(model, Lookup) else Model(model, self.words)
+        return Model(lambda: tables, self.words)
 
     def read_words(self) -> WordList:
         """The words that the options name."""
@@ -146,8 +145,8 @@ class _Run:
         def spread(history: Sequence[int]) -> Singles:
             ids = np.array([*history, end], np.int64)
             place = np.arange(len(ids))
-            view = scorer.view(Passage(ids, place == 0, place == len(history)))
-            return np.where(events, view.spread(len(history)), np.float32(-np.inf))
+            view = scorer.view(TokenSequence(ids, place == 0, place == len(history)))
+            return np.where(events, view.distribution(len(history)), np.float32(-np.inf))
 
         prefixes = map(tokens, self.streams.lines(options["gen-prefixes"])) if options["gen-prefixes"] else [[]]
         for prefix in prefixes:

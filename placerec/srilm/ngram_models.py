@@ -1,13 +1,15 @@
 """The models of `ngram` where more than scoring is asked for: mixed, changed, cached, written; section 11."""
 
+from functools import partial
+
 import numpy as np
 
 from placerec.lm.arpa import row_blocks
 from placerec.lm.draft import Draft, reweigh, unite
 from placerec.lm.mix import merge, merge_weight
-from placerec.lm.passage import Passage
 from placerec.lm.prune import prune, prune_improbable
-from placerec.srilm.arpa import read_model
+from placerec.lm.score import TokenSequence
+from placerec.srilm.arpa import read_model, tables_of
 from placerec.srilm.context_order import ContextTimes, message_order
 from placerec.srilm.messages import Messages
 from placerec.srilm.mixed_scorers import Cached, Lenient, LogLinear, Mixture
@@ -86,10 +88,11 @@ class Models:
                 self.draft, other = self.together(self.model(), self.read(option, "mix-lm file")[0])
                 merge(self.draft, other, merge_weight(weights, k), self.messages(self.draft))
         self.change()
-        model = Model(self.model(), self.words, skipping=options["skipoovs"])
+        model = Model(partial(tables_of, self.model(), self.words), self.words, skipping=options["skipoovs"])
         if not dynamic or not others:
             return model
-        models = [model, *(Model(self.read(option, "mix-lm file")[0], self.words) for option in others)]
+        drafts = [self.read(option, "mix-lm file")[0] for option in others]
+        models = [model, *(Model(partial(tables_of, draft, self.words), self.words) for draft in drafts)]
         self.draft = None
         if options["loglinear-mix"]:
             return LogLinear(models, weights, self.words)
@@ -151,11 +154,11 @@ class Models:
         numbers = np.array([index.get(word, unknown) for word in draft.trie.vocabulary.words], np.int64)
         for n in range(draft.order, 0, -1):
             rows = np.flatnonzero(draft.stored[n - 1])
-            passage = Passage.of_rows(numbers[draft.trie.matrix(n)[rows]])
-            draft.log10_p[n - 1][rows] = scorer.view(passage).score().log10_p[n - 1 :: n]
+            sequence = TokenSequence.of_rows(numbers[draft.trie.matrix(n)[rows]])
+            draft.log10_p[n - 1][rows] = scorer.view(sequence).score().log10_p[n - 1 :: n]
         reweigh(draft, self.messages(draft))
         self.draft, self.words = draft, own
-        return Model(draft, own)
+        return Model(partial(tables_of, draft, own), own)
 
     def write(self, name: str) -> None:
         """`-write-lm`."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask
 from placerec.lm.logs import p_of
-from placerec.lm.passage import Passage
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
+from placerec.lm.score import TokenSequence
 from placerec.srilm.scorers import Scored, Scorer, View, event_numbers
 from placerec.srilm.sentences import Handling, Sentences, joined, mark, read_sentences
 from placerec.srilm.streams import Streams
@@ -76,7 +76,7 @@ class Printer:
         """The sum of all words' probabilities, for the end of a line; a warning if it is not 1."""
         if self.debug != SUMS:
             return ""
-        total = float(p_of(view.spread(t)[self.events]).sum())
+        total = float(p_of(view.distribution(t)[self.events]).sum())
         if abs(total - 1) > 0.0001:
             shown = " ".join(self.name(number) for number in context[::-1].tolist())
             self.streams.say(f"\nwarning: word probs for this context sum to {total:g} != 1 : {shown}")
@@ -85,7 +85,7 @@ class Printer:
     def rank(self, view: View, t: int, word: int, log10_p: float, *, end: bool, weight: float = 1) -> Ranks:
         """The ranks of a token."""
         known = word != self.words.index[self.words.unknown]
-        return rank_word(log10_p, view.spread(t)[self.events], known=known, end=end, weight=weight)
+        return rank_word(log10_p, view.distribution(t)[self.events], known=known, end=end, weight=weight)
 
 
 def print_perplexity(name: str, scorer: Scorer, printer: Printer, handling: Handling, *, whole: bool) -> None:
@@ -100,22 +100,22 @@ def print_perplexity(name: str, scorer: Scorer, printer: Printer, handling: Hand
 
 
 def _score(
-    scorer: Scorer, printer: Printer, sentences: Sentences, passage: Passage, lengths: Ints, ended: Mask
+    scorer: Scorer, printer: Printer, sentences: Sentences, sequence: TokenSequence, lengths: Ints, ended: Mask
 ) -> tuple[Floats, list["_Line"]]:
     """The totals of each sentence (S, 5), and what there is to print about its words."""
-    view = scorer.view(passage)
+    view = scorer.view(sequence)
     scored = view.score()
-    unknown = passage.ids == printer.words.index[printer.words.unknown]
-    totals = tally_sentences(scored.log10_p, unknown, passage.scored, lengths, ended) * sentences.weights[:, None]
+    unknown = sequence.ids == printer.words.index[printer.words.unknown]
+    totals = tally_sentences(scored.log10_p, unknown, sequence.scored, lengths, ended) * sentences.weights[:, None]
     if printer.debug < TOKENS:
         return totals, [_Line() for _ in ended] if printer.debug else []
-    return totals, _token_lines(printer, view, scored, _Batch(passage, lengths, ended, sentences.weights))
+    return totals, _token_lines(printer, view, scored, _Batch(sequence, lengths, ended, sentences.weights))
 
 
 class _Batch(NamedTuple):
     """Sentences: their words, and of each its length (S,), whether it ends in </s> (S,), and its weight (S,)."""
 
-    part: Passage
+    part: TokenSequence
     lengths: Ints
     ended: Mask
     weights: Floats

@@ -5,18 +5,15 @@ specification.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from functools import cached_property
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from placerec.arrays import Ints, Mask, Singles
-from placerec.lm.lookup import Lookup
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
-from placerec.lm.passage import Passage, answers, joint, look_up, look_up_others, read_passage, spread
+from placerec.lm.score import Contexts, ScoreTables, TokenSequence, joint_log10_p
 from placerec.srilm.vocabulary import WordList
-
-if TYPE_CHECKING:
-    from placerec.lm.draft import Draft
 
 Tag = Callable[[int], str]
 
@@ -29,20 +26,20 @@ class Scored(NamedTuple):
 
 
 class View(Protocol):
-    """A passage, read by a scorer."""
+    """A token sequence, read by a scorer."""
 
     def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of `words` (T,) in their places."""
+        """The probabilities of the sequence's words, or of `words` (T,) in their places."""
 
-    def spread(self, t: int) -> Singles:
+    def distribution(self, t: int) -> Singles:
         """log10 p float32 of every word, by SRILM's number, in the place of word `t`."""
 
 
 class Scorer(Protocol):
     """Something that gives words a probability."""
 
-    def view(self, passage: Passage) -> View:
-        """Read a passage."""
+    def view(self, sequence: TokenSequence) -> View:
+        """Read a token sequence."""
 
 
 def event_mask(words: WordList) -> Mask:
@@ -62,13 +59,13 @@ class Null(NamedTuple):
 
     words: WordList
 
-    def view(self, passage: Passage) -> "NullView":
-        """Read a passage."""
-        return NullView(len(passage.ids), len(self.words.words))
+    def view(self, sequence: TokenSequence) -> "NullView":
+        """Read a token sequence."""
+        return NullView(len(sequence.ids), len(self.words.words))
 
 
 class NullView(NamedTuple):
-    """A passage of T words, of a vocabulary of V."""
+    """A token sequence of T words, of a vocabulary of V."""
 
     T: int
     V: int
@@ -77,110 +74,69 @@ class NullView(NamedTuple):
         """Always log 1."""
         return Scored(np.zeros(self.T, np.float32), lambda t: "")
 
-    def spread(self, t: int) -> Singles:
+    def distribution(self, t: int) -> Singles:
         """Always log 1."""
         return np.zeros(self.V, np.float32)
 
 
-class LookupModel:
-    """A back-off model that was read for scoring only; its word numbers are those of `words`."""
-
-    def __init__(self, lookup: Lookup, words: WordList) -> None:
-        self.lookup, self.words = lookup, words
-
-    def view(self, passage: Passage) -> "LookupView":
-        """Read a passage."""
-        return LookupView(self, passage)
-
-
-class LookupView:
-    """A passage, read by a LookupModel."""
-
-    def __init__(self, model: LookupModel, passage: Passage) -> None:
-        self.model, self.lookup = model, model.lookup
-        self.digits = self.lookup.digits(passage.ids)
-        self.contexts = self.lookup.contexts(self.digits, np.flatnonzero(passage.first))
-
-    def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
-        digits = self.digits if words is None else self.lookup.digits(words)
-        log10_p, answered = self.lookup.find(self.contexts, digits)
-        tags = ["[OOV]", *(f"[{n}gram]" for n in range(1, len(self.lookup.tables) + 1))]
-        return Scored(log10_p, lambda t: tags[answered[t]])
-
-    def spread(self, t: int) -> Singles:
-        """log10 p of every word."""
-        every = np.arange(len(self.model.words.words))
-        contexts = [np.full(len(every), codes[t]) for codes in self.contexts]
-        return self.lookup.find(contexts, self.lookup.digits(every))[0]
-
-
 class Model:
-    """A back-off model. `skipping`: probability 0 for unknown words and the two words behind them (-skipoovs)."""
+    """A back-off model, whose tables are made when they are first needed; its word numbers are those of `words`.
 
-    def __init__(self, draft: "Draft", words: WordList, *, skipping: bool = False) -> None:
-        self.draft, self.words, self.skipping = draft, words, skipping
-        self._own = np.zeros(0, np.int64)
+    `skipping`: probability 0 for unknown words and the two words behind them (-skipoovs).
+    """
 
-    def view(self, passage: Passage) -> "ModelView":
-        """Read a passage."""
-        return ModelView(self, passage)
+    def __init__(self, make_tables: Callable[[], ScoreTables], words: WordList, *, skipping: bool = False) -> None:
+        self._make_tables, self.words, self.skipping = make_tables, words, skipping
 
-    @property
-    def own(self) -> Ints:
-        """The model's number of each of SRILM's numbers, -1 for what it does not list."""
-        if len(self._own) != len(self.words.words):
-            index = self.draft.trie.vocabulary.index
-            own = [-1 if word is None else index.get(word, -1) for word in self.words.words]
-            self._own = np.array(own, np.int64)
-        return self._own
+    @cached_property
+    def tables(self) -> ScoreTables:
+        return self._make_tables()
+
+    def view(self, sequence: TokenSequence) -> "ModelView":
+        """Read a token sequence."""
+        return ModelView(self, sequence)
 
 
 class ModelView:
-    """A passage, read by a Model."""
+    """A token sequence, read by a Model."""
 
-    def __init__(self, model: Model, passage: Passage) -> None:
-        self.model = model
-        self.own = model.own
-        self.given = passage.ids
-        self.passage = passage._replace(ids=self.own[passage.ids])
-        self.reading = read_passage(model.draft, self.passage)
+    def __init__(self, model: Model, sequence: TokenSequence) -> None:
+        self.model, self.tables, self.sequence = model, model.tables, sequence
+        self.digits = self.tables.digits(sequence.ids)
+        self.contexts = Contexts(self.tables, self.digits, np.flatnonzero(sequence.first))
         self.unknown = model.words.index[model.words.unknown]
-        self.near = np.zeros(len(passage.ids), bool)
-        if model.skipping:
-            place, unknown = passage.place, passage.ids == self.unknown
-            for back in (1, 2):
-                self.near[back:] |= unknown[:-back] & (place[back:] >= back)
+        self.tags = ["[OOV]", *(f"[{n}gram]" for n in range(1, len(self.tables.tables) + 1))]
+
+    @cached_property
+    def near(self) -> Mask:
+        """The words within two behind an unknown one, bool (T,)."""
+        near = np.zeros(len(self.digits), bool)
+        place, unknown = self.sequence.place, self.sequence.ids == self.unknown
+        for back in (1, 2):
+            near[back:] |= unknown[:-back] & (place[back:] >= back)
+        return near
 
     def score(self, words: Ints | None = None) -> Scored:
-        """The probabilities of the passage's words, or of others in their places."""
-        own = None if words is None else self.own[words]
-        log10_p = look_up(self.reading) if own is None else look_up_others(self.reading, own)
-        skipped = np.zeros(len(log10_p), bool)
-        if self.model.skipping:
-            skipped = self.near | ((self.passage.ids if own is None else own) == self.own[self.unknown])
-            log10_p = np.where(skipped, np.float32(-np.inf), log10_p)
-        lengths: list[Ints] = []
+        """The probabilities of the sequence's words, or of others in their places."""
+        digits = self.digits if words is None else self.tables.digits(words)
+        log10_p, answered = self.tables.find(self.contexts, digits)
+        if not self.model.skipping:
+            return Scored(log10_p, lambda t: self.tags[answered[t]])
+        skipped = self.near | ((self.sequence.ids if words is None else words) == self.unknown)
+        log10_p[skipped] = -np.inf
+        return Scored(log10_p, lambda t: "" if skipped[t] else self.tags[answered[t]])
 
-        def tag(t: int) -> str:
-            if not lengths:
-                lengths.append(answers(self.reading, own))
-            return "" if skipped[t] else f"[{lengths[0][t]}gram]" if lengths[0][t] else "[OOV]"
-
-        return Scored(log10_p, tag)
-
-    def spread(self, t: int) -> Singles:
+    def distribution(self, t: int) -> Singles:
         """log10 p of every word."""
-        every = spread(self.reading, t)
-        log10_p = np.where(self.own >= 0, every[self.own], np.float32(-np.inf))
+        log10_p, later = self.tables.distribution(self.contexts, t), len(self.model.words.words) - self.tables.V
+        if later:
+            log10_p = np.append(log10_p, np.full(later, -np.inf, np.float32))
         if self.model.skipping:
-            log10_p[self.unknown] = -np.inf
-            log10_p[:] = np.where(self.near[t], np.float32(-np.inf), log10_p)
+            log10_p[slice(None) if self.near[t] else self.unknown] = -np.inf
         return log10_p
 
     def joint(self, length: int) -> Singles:
         """log10 of the joint probability of the last `length` words before each word, float32 (T,)."""
-        index = self.model.draft.trie.vocabulary.index
-        start, end = index.get(SENTENCE_START, -2), index.get(SENTENCE_END, -1)
-        silent = ~event_mask(self.model.words)[self.given]
-        return joint(self.reading, self.passage, length, silent, start=start, end=end)
+        index, silent = self.model.words.index, ~event_mask(self.model.words)[self.sequence.ids]
+        start, end = index.get(SENTENCE_START, -1), index.get(SENTENCE_END, -1)
+        return joint_log10_p(self.tables, self.sequence, length, silent, start=start, end=end)

@@ -10,7 +10,7 @@ import numpy as np
 from placerec.ahead import make_ahead
 from placerec.arrays import Floats, Ints, Mask
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START
-from placerec.lm.passage import Passage
+from placerec.lm.score import TokenSequence
 from placerec.srilm.fields import NameTable, split_lines, usual_blocks, with_odd_bytes, without_comments
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import Lines, Streams, tokens
@@ -129,8 +129,8 @@ def joined(parts: Sequence[Sentences]) -> Sentences:
     return Sentences(numbers, lengths, weights, shown, escapes)
 
 
-def mark(sentences: Sentences, words: WordList, handling: Handling) -> tuple[Passage, Ints, Mask]:
-    """The passage to score, the lengths of its sentences (S,), and whether each of them ends in </s> (S,)."""
+def mark(sentences: Sentences, words: WordList, handling: Handling) -> tuple[TokenSequence, Ints, Mask]:
+    """The token sequence to score, the lengths of its sentences (S,), and whether each of them ends in </s> (S,)."""
     start_number, end_number = words.index.get(SENTENCE_START, -1), words.index.get(SENTENCE_END, -1)
     numbers, size = sentences.numbers, len(sentences.lengths)
     stops = np.cumsum(sentences.lengths)
@@ -160,7 +160,7 @@ def mark(sentences: Sentences, words: WordList, handling: Handling) -> tuple[Pas
     has_end = np.zeros(size, bool)
     predicted = whole - (opened | (before > 0)) > 0
     has_end[predicted] = ids[(begin + whole - 1)[predicted]] == end_number
-    return Passage(ids, first, scored), whole, has_end
+    return TokenSequence(ids, first, scored), whole, has_end
 
 
 def _reversed(numbers: Ints, lengths: Ints, opened: Mask, ended: Mask) -> Ints:

@@ -24,7 +24,7 @@ from hmmlearn.hmm import CategoricalHMM
 from placerec import reference
 from placerec.hohmm import Recognizer, filter_stream, fixed_transition
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing, with_unigrams, write_arpa
-from placerec.lm.union import unite_models
+from placerec.lm.backoff import unite_models
 
 PLACES, WORDS, ORDER, STAY, TURNS = 5, 400, 4, 0.99, 5
 NAMES = [f"w{number:03d}" for number in range(WORDS)]

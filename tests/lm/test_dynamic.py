@@ -46,7 +46,7 @@ def test_a_cache_holds_the_words_before(text: list[tuple[int, bool]], size: int)
         recent = [before for before, count in text[:t] if count][-size:]
         expected = [recent.count(other) / max(1, len(recent)) for other in range(4)]
         assert shares[t] == pytest.approx(expected[word])
-        assert cache.spread(t, 4).tolist() == pytest.approx(expected)
+        assert cache.distribution(t, 4).tolist() == pytest.approx(expected)
 
 
 def test_a_cache_takes_its_share() -> None:

@@ -10,6 +10,7 @@ from placerec.errors import LanguageModelError, MissingExtraError
 from placerec.lm import SMOOTHINGS, count_ngrams, estimate, read_arpa, smoothing, with_unigrams, write_arpa
 from placerec.lm.checks import check_model, generated_stream
 from placerec.lm.external import kenlm_scorer
+from placerec.lm.score import Contexts
 
 WORDS = [f"w{i:02d}" for i in range(30)]
 
@@ -42,11 +43,10 @@ def test_kenlm_agrees_in_silence(
 
 
 def test_generated_streams_reach_every_order(tmp_path: Path) -> None:
-    from placerec.lm.backoff import score_ids
-
     model = read_arpa(write_model(tmp_path / "model.arpa", "witten-bell", 4))
     words = generated_stream(model, 2000)
-    _, answered = score_ids(model, model.ids(words))
+    digits = model.tables.digits(model.ids(words))
+    _, answered = model.tables.find(Contexts(model.tables, digits, np.array([0])), digits)
     assert set(answered.tolist()) == {1, 2, 3, 4}
 
 

@@ -16,7 +16,7 @@ from placerec.arrays import Floats
 from placerec.experiments.comparison.encoded import EncodedSequences
 from placerec.experiments.store import key_of
 from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder
-from placerec.lm.union import unite_models
+from placerec.lm.backoff import unite_models
 from placerec.methods import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
 from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
 from placerec.model import Decoding, ModelOptions, PlaceModels, load_model, train_model, transition_of

@@ -22,8 +22,8 @@ from placerec.hohmm.decoder import warn_of_unlisted
 from placerec.hohmm.evidence import evidence_in
 from placerec.hohmm.offline import believe
 from placerec.lm import BackoffModel, NgramCounts, count_ngrams
+from placerec.lm.backoff import unite_models
 from placerec.lm.trie import Trie
-from placerec.lm.union import unite_models
 from placerec.model import Corpus, ModelOptions, estimate_place, read_corpus
 from placerec.words import Selection, WordStream, parse_selection, place_steps
 from placerec.words.folder import read_streams
