@@ -16,8 +16,16 @@ from single_frame import arguments, described, fold_names
 from placerec.arrays import Floats
 from placerec.evaluation.confidence import new_places
 from placerec.hohmm import filter_stream
-from placerec.hohmm.distances import Histogram, distance_histogram
-from placerec.hohmm.unknown import CHAIN, UnknownModel, chain_evidence, evidence, unknown_model, word_runs
+from placerec.hohmm.unknown import (
+    CHAIN,
+    Histogram,
+    UnknownModel,
+    chain_evidence,
+    distance_histogram,
+    evidence,
+    unknown_model,
+    word_runs,
+)
 from placerec.vision import Descriptors
 
 SCORES = ("1 - belief", "entropy", "distance", "words", "words, distance")
@@ -54,7 +62,10 @@ def scores(case: Trained) -> list[Floats]:
         before, after = filtered(log10_p)
 
         def unknown(
-            model: UnknownModel, log10_p: Floats = log10_p, before: Floats = before, far: Floats = stream.distances
+            model: UnknownModel,
+            log10_p: Floats = log10_p,
+            before: Floats = before,
+            far: Floats = stream.distances,
         ) -> Floats:
             chain = chain_evidence(evidence(model, log10_p, before, far), log10_p.shape[1])
             return filter_stream(chain, CHAIN).belief[:, 0]

@@ -12,11 +12,10 @@ from placerec.hohmm.beliefs import (
 )
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.decoder import Belief, Posterior, SequenceDecoder, TakeIn
-from placerec.hohmm.emissions import Emissions, SeparateEmissions
+from placerec.hohmm.evidence import Emissions, SeparateEmissions
 from placerec.hohmm.filter import Filtered, filter_stream
 from placerec.hohmm.recognizer import Recognizer
-from placerec.hohmm.transition_file import read_transitions
-from placerec.hohmm.transitions import PER, Transition, fixed_transition, learned_transition
+from placerec.hohmm.transitions import PER, Transition, fixed_transition, learned_transition, read_transitions
 
 __all__ = [
     "PER",

@@ -15,6 +15,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
+from placerec.hohmm.filter import normalised
 
 # A place that the filter rules out: no temperature could bring back a belief of 0.
 _SMALLEST_BELIEF = 1e-15
@@ -34,7 +35,7 @@ class Calibration:
 
     def apply(self, belief: Floats) -> Floats:
         """The calibrated belief (..., C) of each row of `belief` (..., C); rows sum to 1."""
-        return _tempered(np.log(np.maximum(belief, _SMALLEST_BELIEF)), 1 / self.temperature)
+        return normalised(1 / self.temperature * np.log(np.maximum(belief, _SMALLEST_BELIEF)))
 
     def to_json(self) -> dict[str, Any]:
         """Plain values for model.json."""
@@ -68,7 +69,7 @@ def fit_calibration(belief: Floats, truth: Ints) -> Calibration:
 
     def slope(exponent: float) -> float:
         """The loss is convex in the exponent, so that its slope has one zero."""
-        expected = (_tempered(log_belief, exponent) * log_belief).sum()
+        expected = (normalised(exponent * log_belief) * log_belief).sum()
         return float(expected - evidence) + _PRIOR * (exponent - 1)
 
     low, high = 1 / _MOST, 1 / _LEAST
@@ -77,12 +78,5 @@ def fit_calibration(belief: Floats, truth: Ints) -> Calibration:
         low, high = (low, middle) if slope(middle) > 0 else (middle, high)
     # Six digits: a file to read, and the last bits of a sum differ from machine to machine.
     temperature = float(f"{1 / math.sqrt(low * high):.6g}")
-    losses = [float(-np.log(_tempered(log_belief, x)[rows, truth]).mean()) for x in (1.0, 1 / temperature)]
+    losses = [float(-np.log(normalised(x * log_belief)[rows, truth]).mean()) for x in (1.0, 1 / temperature)]
     return Calibration(temperature, len(truth), *(float(f"{loss:.6g}") for loss in losses))
-
-
-def _tempered(log_belief: Floats, exponent: float) -> Floats:
-    weighed = exponent * log_belief
-    power = np.exp(weighed - weighed.max(axis=-1, keepdims=True))
-    tempered: Floats = power / power.sum(axis=-1, keepdims=True)
-    return tempered

@@ -1,28 +1,89 @@
-"""A stream as the filter sees it: which words count, what they say of the places, and how much passed in between."""
+"""A stream as the filter sees it: which words count, how probable they are in each place, how much passed in between.
 
-from collections.abc import Collection, Iterator
+The probabilities are P(z_t | z_{t-n:t-1}, c) of eq. 1, of the models or of whatever stands for them (`Emissions`).
+"""
+
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask
-from placerec.errors import StreamError
-from placerec.hohmm.emissions import Emissions
+from placerec.errors import ModelError, StreamError
+from placerec.lm import BackoffModel
+from placerec.lm.external import Scorer
 from placerec.words import Selection, WordStream, select
+
+# What every ARPA file lists beside its words.
+MARKERS = frozenset({"<s>", "</s>", "<unk>"})
+
+
+class Emissions(Protocol):
+    """What the filter asks of the models of C places; `lm.union.ModelUnion` is one."""
+
+    def score(self, words: Sequence[str]) -> Floats:
+        """log10 p float64 (T, C) of each of T words in each place, after the words before it."""
+
+    def follow(self) -> Callable[[str], Sequence[float]]:
+        """A function from each word of a sequence in turn to its log10 p (C) in each place, in constant memory."""
+
+
+class SeparateEmissions:
+    """Emissions of one scorer per place, such as KenLM's; `order` is the highest of their models."""
+
+    def __init__(self, scorers: Sequence[Scorer], order: int) -> None:
+        self._scorers = scorers
+        self._order = order
+
+    def score(self, words: Sequence[str]) -> Floats:
+        """log10 p float64 (T, C) of each of T words in each place, after the words before it."""
+        return np.stack([score(words) for score in self._scorers], axis=1)
+
+    def follow(self) -> Callable[[str], Sequence[float]]:
+        """A function from each word of a sequence in turn to its log10 p (C), which keeps `order` words."""
+        recent: deque[str] = deque(maxlen=self._order)
+
+        def score(word: str) -> list[float]:
+            recent.append(word)
+            return [float(score([*recent])[-1]) for score in self._scorers]
+
+        return score
+
+
+def common_words(models: Mapping[str, BackoffModel]) -> frozenset[str]:
+    """The words that the models of all places list, markers apart; ModelError if they do not list the same."""
+    (first, model), *others = models.items()
+    words = set(model.words) - MARKERS
+    for place, other in others:
+        differ = words ^ (set(other.words) - MARKERS)
+        if differ:
+            word = min(differ)
+            have, lack = (first, place) if word in words else (place, first)
+            raise ModelError(
+                f"the model of {have!r} lists the word {word!r} and that of {lack!r} does not; "
+                "a word that one place lacks would decide for another: train them on one vocabulary"
+            )
+    return frozenset(words)
 
 
 @dataclass(frozen=True)
 class Evidence:
     """An uninterrupted part of a stream, n frames with U selected words.
 
-    `selected` bool (n,); `at` int64 (U,): where in the stream the selected words stand; `log10_p` float64 (U, C): of
-    them in each place; `elapsed` float64 (U,): steps of the transitions since the selected word before, the first 0.
+    `selected` bool (n,); `at` int64 (U,): where in the stream the selected words stand; `log10_likelihoods` float64
+    (U, C): of these words in each place; `elapsed` float64 (U,): steps of the transitions since the selected word
+    before, the first 0.
     """
 
     selected: Mask = field(repr=False)
     at: Ints = field(repr=False)
-    log10_p: Floats = field(repr=False)
+    log10_likelihoods: Floats = field(repr=False)
     elapsed: Floats = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.selected)
 
     @property
     def updates(self) -> Ints:
@@ -53,8 +114,8 @@ def evidence_in(
         words = [stream.words[i] for i in part[known[part]].tolist()]
         selected[known[part]] = select(words, selection)
         at = part[selected]
-        log10_p = emissions.score([stream.words[i] for i in at.tolist()])
-        yield Evidence(selected, at, log10_p, _elapsed(at, stream.times, per))
+        log10_likelihoods = emissions.score([stream.words[i] for i in at.tolist()])
+        yield Evidence(selected, at, log10_likelihoods, _elapsed(at, stream.times, per))
 
 
 def _elapsed(at: Ints, times: Floats, per: str) -> Floats:

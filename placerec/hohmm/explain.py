@@ -21,8 +21,8 @@ from placerec.arrays import Floats, Ints
 from placerec.hohmm import unknown
 from placerec.hohmm.evidence import Evidence
 from placerec.hohmm.filter import filter_stream
-from placerec.hohmm.motion import CHUNK, motion, predict_beliefs
-from placerec.hohmm.offline import unknown_ratios
+from placerec.hohmm.posterior import unknown_ratios
+from placerec.hohmm.prediction import CHUNK, predicted_beliefs, transition_steps
 from placerec.hohmm.transitions import Transition
 from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
@@ -46,15 +46,15 @@ class TakenIn(NamedTuple):
     """A selected word as the filter took it in, on-line.
 
     `frame`: its number, from 0; `time`: seconds, None where unknown; `steps` of the transitions since the word before;
-    `log10_p`, `before`, `after` float64 (C,): of the word in each place, and the beliefs before and after it; `news`
-    float64 (3,): see `_news`.
+    `log10_likelihoods`, `before`, `after` float64 (C,): of the word in each place, and the beliefs before and after it;
+    `news` float64 (3,): see `_news`.
     """
 
     frame: int
     time: float | None
     word: str
     steps: float
-    log10_p: Floats
+    log10_likelihoods: Floats
     before: Floats
     after: Floats
     news: Floats | None
@@ -62,9 +62,9 @@ class TakenIn(NamedTuple):
 
 def explain_last(taken_in: Sequence[TakenIn], models: Mapping[str, BackoffModel], transition: Transition) -> Decision:
     """What decided after the last of some words, one at least, of which WINDOW are enough."""
-    frames, times, words, steps, log10_p, before, after, news = zip(*taken_in, strict=True)
+    frames, times, words, steps, log10_likelihoods, before, after, news = zip(*taken_in, strict=True)
     n = len(taken_in)
-    part = Evidence(np.ones(n, bool), np.arange(n), np.array(log10_p), np.array(steps))
+    part = Evidence(np.ones(n, bool), np.arange(n), np.array(log10_likelihoods), np.array(steps))
     seconds = [math.nan if time is None else time for time in times]
     stream = WordStream.of("", words, frames=map(str, frames), times=seconds)
     asked = None if news[-1] is None else np.array(news)
@@ -80,7 +80,7 @@ def explain_part(
     unknown: UnknownModel | None,
 ) -> Iterator[Decision]:
     """What decided after each selected word of a part of a stream; `models` of the places, in order."""
-    before, after = _beliefs(part.log10_p, transition, part.elapsed)
+    before, after = _beliefs(part.log10_likelihoods, transition, part.elapsed)
     news = None if unknown is None else _news(part, transition, unknown, stream.distances[part.at])
     return _decisions(part, stream, models, transition, before, after, news)
 
@@ -101,7 +101,7 @@ def _decisions(
     order = np.argsort(-after, axis=1, kind="stable")
     contributed = contributions(part, transition, before, after, order[:, :2])
     words = [stream.words[i] for i in part.at.tolist()]
-    numbers = np.stack([part.log10_p, before, after], axis=2)
+    numbers = np.stack([part.log10_likelihoods, before, after], axis=2)
     for t, i in enumerate(part.at.tolist()):
         history = words[max(0, t - longest) : t]
         best, *others = [places[column] for column in order[t].tolist()]
@@ -132,10 +132,10 @@ def contributions(part: Evidence, transition: Transition, before: Floats, after:
     found = np.zeros((U, WINDOW))
     if C < 2:
         return found
-    evidence = np.maximum(part.log10_p, NEVER)
+    evidence = np.maximum(part.log10_likelihoods, NEVER)
     # A word that no place explains left the prediction as it was.
-    evidence[np.isneginf(part.log10_p).all(axis=1)] = 0.0
-    steps = motion(transition, part.elapsed[1:])
+    evidence[np.isneginf(part.log10_likelihoods).all(axis=1)] = 0.0
+    steps = transition_steps(transition, part.elapsed[1:])
     for start in range(0, U, CHUNK):
         stop, first = min(start + CHUNK, U), max(0, start - WINDOW)
         matrices = np.moveaxis(steps.matrices(slice(first, stop - 1)), 2, 0)
@@ -153,15 +153,15 @@ def contributions(part: Evidence, transition: Transition, before: Floats, after:
     return found
 
 
-def _beliefs(log10_p: Floats, transition: Transition, elapsed: Floats) -> tuple[Floats, Floats]:
-    after = filter_stream(log10_p, transition, elapsed).belief
-    return predict_beliefs(after, transition, elapsed), after
+def _beliefs(log10_likelihoods: Floats, transition: Transition, elapsed: Floats) -> tuple[Floats, Floats]:
+    after = filter_stream(log10_likelihoods, transition, elapsed).belief
+    return predicted_beliefs(after, transition, elapsed), after
 
 
 def _news(part: Evidence, transition: Transition, model: UnknownModel, distances: Floats) -> Floats:
     """Per selected word what it says of a new place, log10, and the probability of that before and after: (U, 3)."""
     ratios = unknown_ratios(part, transition, model, distances)
-    places = part.log10_p.shape[1]
+    places = part.log10_likelihoods.shape[1]
     before, after = _beliefs(unknown.chain_evidence(ratios, places), unknown.CHAIN, part.elapsed)
     before[:1, 0], _ = unknown.prior(places)
     return np.stack([ratios / math.log(10), before[:, 0], after[:, 0]], axis=1)

@@ -14,16 +14,15 @@ from placerec.hohmm import unknown as new_place
 from placerec.hohmm.beliefs import Beliefs
 from placerec.hohmm.calibration import Calibration
 from placerec.hohmm.decoder import Posterior, SequenceDecoder, TakeIn, warn_of_unlisted
-from placerec.hohmm.emissions import Emissions, common_words
-from placerec.hohmm.evidence import Evidence, evidence_in
+from placerec.hohmm.evidence import Emissions, Evidence, common_words, evidence_in
 from placerec.hohmm.explain import WINDOW, Decision, TakenIn, explain_last, explain_part
-from placerec.hohmm.filter import LN10
-from placerec.hohmm.offline import believe, believe_unknown, most_probable_path
-from placerec.hohmm.online import OnlineFilter
+from placerec.hohmm.filter import OnlineFilter
+from placerec.hohmm.posterior import most_probable_path, posterior, unknown_posterior
 from placerec.hohmm.transitions import Transition, fixed_transition
 from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
 from placerec.lm.backoff import unite_models
+from placerec.lm.logs import LN10
 from placerec.words import Selection, WordStream
 
 if TYPE_CHECKING:
@@ -100,16 +99,18 @@ class Recognizer(SequenceDecoder):
     def _take_in(self, word: str, steps: float | None, distance: float | None) -> Posterior:
         if steps is not None:
             self._filter.predict(steps)
-        log10_p = self._score(word)
+        log10_likelihoods = self._score(word)
         news = None
         if self.unknown is not None:
-            news = self._weigh_unknown(self.unknown, log10_p, steps, distance)
+            news = self._weigh_unknown(self.unknown, log10_likelihoods, steps, distance)
         before = self._filter.belief() if self._models else None
-        posterior = self._posterior(self._filter.weigh(log10_p))
+        posterior = self._posterior(self._filter.condition_on(log10_likelihoods))
         if before is not None:
             after = self._filter.belief()
             frame, time = self._now.frame - 1, self._now.time
-            self._taken_in.append(TakenIn(frame, time, word, steps or 0.0, np.array(log10_p), before, after, news))
+            self._taken_in.append(
+                TakenIn(frame, time, word, steps or 0.0, np.array(log10_likelihoods), before, after, news)
+            )
         return posterior
 
     def _posterior(self, possible: bool) -> Posterior:
@@ -120,7 +121,7 @@ class Recognizer(SequenceDecoder):
         return probability, unknown, possible
 
     def _weigh_unknown(
-        self, model: UnknownModel, log10_p: Sequence[float], steps: float | None, distance: float | None
+        self, model: UnknownModel, log10_likelihoods: Sequence[float], steps: float | None, distance: float | None
     ) -> Floats:
         """Take in a word as evidence for a place that is unknown; the filter is at its prediction.
 
@@ -129,9 +130,9 @@ class Recognizer(SequenceDecoder):
         if steps is not None:
             self._chain.predict(steps)
         far = np.array([math.nan if distance is None else distance])
-        (ratio,) = new_place.evidence(model, np.array([log10_p]), self._filter.belief()[None], far).tolist()
+        (ratio,) = new_place.evidence(model, np.array([log10_likelihoods]), self._filter.belief()[None], far).tolist()
         before = self._chain.log_belief[0]
-        self._chain.weigh([ratio / LN10, 0.0])
+        self._chain.condition_on([ratio / LN10, 0.0])
         return np.array([ratio / LN10, math.exp(before), math.exp(self._chain.log_belief[0])])
 
     def explain(self) -> Decision:
@@ -164,7 +165,7 @@ class Recognizer(SequenceDecoder):
     ) -> Beliefs:
         """The beliefs over a whole sequence: those that `update` gives from a reset, which later words never change.
 
-        `smooth`, `lag`: see `believe`; later words count. `viterbi`: `best` is the most probable path. Words that the
+        `smooth`, `lag`: see `posterior`; later words count. `viterbi`: `best` is the most probable path. Words that the
         models do not list are skipped as `skip` does, and counted in a warning. Raises StreamError as `evidence_in`.
         """
         warn_of_unlisted(stream, self)
@@ -192,12 +193,12 @@ class Recognizer(SequenceDecoder):
         )
 
     def _decoded(self, part: Evidence, stream: WordStream, *, smooth: bool, viterbi: bool, lag: int | None) -> _Decoded:
-        belief, never = believe(part, self.transition, smooth=smooth, lag=lag)
+        belief, never = posterior(part, self.transition, smooth=smooth, lag=lag)
         best = most_probable_path(part, self.transition) if viterbi else belief.argmax(axis=1)
         if self.calibration is not None:
             belief = self.calibration.apply(belief)
         unknown = np.empty(0)
         if self.unknown is not None:
             far = stream.distances[part.at]
-            unknown = believe_unknown(part, self.transition, self.unknown, far, smooth=smooth, lag=lag)
+            unknown = unknown_posterior(part, self.transition, self.unknown, far, smooth=smooth, lag=lag)
         return _Decoded(belief, best, unknown, never)

@@ -22,9 +22,8 @@ from itertools import groupby
 import numpy as np
 
 from placerec.arrays import Floats, Ints
-from placerec.hohmm.distances import BINS_PER_OCTAVE, Histogram
-from placerec.hohmm.filter import LN10
 from placerec.hohmm.transitions import fixed_transition
+from placerec.lm.logs import LN10
 
 # Unknown and known are kept with the paper's p_e, in the steps of the places' transitions.
 CHAIN = fixed_transition(2, 0.99)
@@ -34,6 +33,29 @@ OUTLYING = 1.0
 _FREEDOM = 0.9
 # What the correction leaves open, in octaves.
 _SHIFT_ERROR = 0.3
+BINS_PER_OCTAVE = 8
+# Distances of the frames of a place to their words: ascending bin -> how many, none of them 0. These are integers, so
+# that adding and taking away is exact. A distance d is in bin b if 2**(b/8) <= d < 2**((b+1)/8).
+Histogram = dict[int, int]
+
+
+def distance_bins(distances: Floats) -> Ints:
+    """int64 (k,): floor(8 log2 d) of those of `distances` (n,) that are above 0; the others, and nan, are left out."""
+    known = distances[np.isfinite(distances) & (distances > 0)]
+    bins: Ints = np.floor(BINS_PER_OCTAVE * np.log2(known)).astype(np.int64)
+    return bins
+
+
+def distance_histogram(distances: Floats) -> Histogram:
+    """How many of `distances` (n,) are in each bin."""
+    bins, counts = np.unique(distance_bins(distances), return_counts=True)
+    return dict(zip(bins.tolist(), counts.tolist(), strict=True))
+
+
+def add_histograms(first: Histogram, second: Histogram, sign: int = 1) -> Histogram:
+    """`first` plus `sign` (1 or -1) times `second`; a difference may be negative, an empty bin is left out."""
+    total = {b: first.get(b, 0) + sign * second.get(b, 0) for b in sorted(first.keys() | second.keys())}
+    return {b: count for b, count in total.items() if count}
 
 
 @dataclass(frozen=True)
@@ -108,13 +130,13 @@ def measure_distances(distances: Floats, places: Ints, histograms: Sequence[Hist
     return float(outlying.mean()), float(outlying.var())
 
 
-def evidence(model: UnknownModel, log10_p: Floats, predicted: Floats, distances: Floats) -> Floats:
+def evidence(model: UnknownModel, log10_likelihoods: Floats, predicted: Floats, distances: Floats) -> Floats:
     """log of p(frame | unknown) / p(frame | known), natural, (T,) for T selected frames.
 
-    log10_p: (T, C) of each word under each place; predicted: (T, C) the filter's belief before each word (uniform
-    before the first); distances: (T,), nan where unknown. A frame's evidence depends on its own row alone.
+    log10_likelihoods: (T, C) of each word in each place; predicted: (T, C) the filter's belief before each word
+    (uniform before the first); distances: (T,), nan where unknown. A frame's evidence depends on its own row alone.
     """
-    ratio = _word_evidence(model.vocabulary, log10_p, predicted)
+    ratio = _word_evidence(model.vocabulary, log10_likelihoods, predicted)
     if model.distance is not None:
         ratio = ratio + _distance_evidence(model.distance, predicted, distances)
     return model.news * ratio
@@ -136,13 +158,13 @@ def chain_evidence(ratios: Floats, places: int) -> Floats:
     return found
 
 
-def _word_evidence(vocabulary: int, log10_p: Floats, predicted: Floats) -> Floats:
+def _word_evidence(vocabulary: int, log10_likelihoods: Floats, predicted: Floats) -> Floats:
     # A likelihood ratio does not change if all likelihoods are divided by the largest.
-    top = log10_p.max(axis=1, initial=-np.inf)
+    top = log10_likelihoods.max(axis=1, initial=-np.inf)
     scale = np.where(np.isfinite(top), top, 0.0)
-    likelihood = 10.0 ** (log10_p - scale[:, None])
+    likelihood = 10.0 ** (log10_likelihoods - scale[:, None])
     flat = 10.0**-scale / vocabulary
-    anywhere = (likelihood.sum(axis=1) + flat) / (log10_p.shape[1] + 1)
+    anywhere = (likelihood.sum(axis=1) + flat) / (log10_likelihoods.shape[1] + 1)
     known = (predicted * likelihood).sum(axis=1)
     with np.errstate(divide="ignore"):
         ratio: Floats = np.log(anywhere) - np.log(known)

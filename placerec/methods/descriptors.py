@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from placerec.hohmm import Transition
 from placerec.hohmm.filter import filter_step
-from placerec.hohmm.motion import predictor
+from placerec.hohmm.prediction import predictor
 from placerec.methods.training_set import normalised
 
 Floats = NDArray[np.float64]

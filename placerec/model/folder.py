@@ -22,7 +22,7 @@ from placerec.errors import ModelError, PlacerecError
 from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
 from placerec.hohmm import Calibration
-from placerec.hohmm.distances import Histogram
+from placerec.hohmm.unknown import Histogram
 from placerec.lm import BackoffModel, read_arpa
 from placerec.model.options import ModelOptions
 from placerec.model.record import LearnedSequence, Record

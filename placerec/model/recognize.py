@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from placerec.errors import ModelError
 from placerec.hohmm import Calibration, Emissions, Recognizer, SeparateEmissions
-from placerec.hohmm.emissions import MARKERS
+from placerec.hohmm.evidence import MARKERS
 from placerec.hohmm.unknown import UnknownModel, unknown_model, word_runs
 from placerec.lm.external import kenlm_scorer
 from placerec.model.decoding import PAPER, Decoding, check_online, describe_decoding, transition_of

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import ModelError
-from placerec.hohmm.distances import Histogram, add_histograms, distance_histogram
+from placerec.hohmm.unknown import Histogram, add_histograms, distance_histogram
 from placerec.words import Sentences, WordStream, place_steps, place_triples
 
 Steps = NDArray[np.int64]

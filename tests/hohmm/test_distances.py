@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.arrays import Floats
-from placerec.hohmm.distances import add_histograms, distance_bins, distance_histogram
+from placerec.hohmm.unknown import add_histograms, distance_bins, distance_histogram
 
 DISTANCES = st.lists(st.floats(1e-9, 1e9), max_size=30).map(np.array)
 

@@ -14,7 +14,7 @@ from placerec.errors import ModelError
 from placerec.hohmm import Recognizer, Transition, explain, filter_stream, fixed_transition
 from placerec.hohmm.evidence import Evidence
 from placerec.hohmm.explain import WINDOW, contributions
-from placerec.hohmm.motion import predict_beliefs
+from placerec.hohmm.prediction import predicted_beliefs
 from placerec.words import Selection, WordStream
 
 CORPUS = [[["a", "b", "a", "b", "b"]], [["c", "d", "c"]], [["a", "d"], ["b"]]]
@@ -55,7 +55,7 @@ def evidence(log10_p: Any, elapsed: Any) -> Evidence:
 
 def both(log10_p: Any, transition: Transition, elapsed: Any) -> tuple[Any, Any]:
     after = filter_stream(log10_p, transition, elapsed).belief
-    return predict_beliefs(after, transition, elapsed), after
+    return predicted_beliefs(after, transition, elapsed), after
 
 
 @settings(max_examples=50)
@@ -92,7 +92,12 @@ def test_without_changes_of_place_contributions_are_likelihood_ratios() -> None:
 def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(1)
     log10_p, elapsed, transition = -3 * rng.random((70, 3)), np.ones(70), fixed_transition(3, 0.9)
-    case = evidence(log10_p, elapsed), transition, *both(log10_p, transition, elapsed), np.tile([0, 1], (70, 1))
+    case = (
+        evidence(log10_p, elapsed),
+        transition,
+        *both(log10_p, transition, elapsed),
+        np.tile([0, 1], (70, 1)),
+    )
     whole = contributions(*case)
     monkeypatch.setattr(explain, "CHUNK", 7)
     assert np.array_equal(contributions(*case), whole)
@@ -105,7 +110,10 @@ def test_contributions_are_finite_whatever_is_impossible(case: Any) -> None:
     pair = np.zeros((len(log10_p), 2), np.int64)
     pair[:, 1] = places - 1
     found = contributions(
-        evidence(log10_p, case.steps), transition, *both(log10_p, transition, case.steps), pair[:, : min(places, 2)]
+        evidence(log10_p, case.steps),
+        transition,
+        *both(log10_p, transition, case.steps),
+        pair[:, : min(places, 2)],
     )
     assert np.isfinite(found).all()
 

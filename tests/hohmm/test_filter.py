@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 
 from placerec.hohmm import filter, filter_stream, fixed_transition, learned_transition
 from placerec.hohmm.filter import filter_step
-from placerec.hohmm.motion import predictor
+from placerec.hohmm.prediction import predictor
 
 
 @given(cases(longest=60))
 def test_the_filter_is_its_definition(case: Case) -> None:
-    expected, explained = plain_filter.filtered(*case)
+    expected, possible = plain_filter.filtered(*case)
     found = filter_stream(case.log10_p, case.transition, case.steps)
     assert found.belief == pytest.approx(expected, abs=1e-12)
-    assert found.explained.tolist() == explained
-    assert found.unexplained == explained.count(False)
+    assert found.possible.tolist() == possible
+    assert found.zero_likelihood_words == possible.count(False)
 
 
 @settings(max_examples=50)
@@ -33,7 +33,7 @@ def test_blocks_of_any_size_give_the_same(case: Case, block: int, together: int,
         blocks = filter_stream(case.log10_p, case.transition, case.steps)
     whole = filter_stream(case.log10_p, case.transition, case.steps)
     assert blocks.belief == pytest.approx(whole.belief, abs=1e-12)
-    assert np.array_equal(blocks.explained, whole.explained)
+    assert np.array_equal(blocks.possible, whole.possible)
 
 
 @settings(max_examples=40)
@@ -99,7 +99,7 @@ def test_where_no_place_explains_the_word_the_prediction_is_kept() -> None:
     log10_p = np.array([[-1.0, -2.0], [-np.inf, -np.inf]])
     found = filter_stream(log10_p, fixed_transition(2, 0.9))
     first = np.array([10, 1]) / 11
-    assert found.unexplained == 1
+    assert found.zero_likelihood_words == 1
     assert found.belief[1] == pytest.approx(0.9 * first + 0.1 * first[::-1])
 
 

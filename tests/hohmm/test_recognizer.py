@@ -22,9 +22,9 @@ from placerec.hohmm import (
     SeparateEmissions,
     SequenceDecoder,
     Transition,
+    filter,
     fixed_transition,
     learned_transition,
-    online,
 )
 from placerec.hohmm.unknown import DistanceModel, UnknownModel
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
@@ -342,7 +342,7 @@ def test_scorers_of_their_own_give_the_same() -> None:
 
 
 def test_memory_does_not_grow_with_the_stream(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(online, "PREDICTORS", 5)
+    monkeypatch.setattr(filter, "PREDICTORS", 5)
     found = Recognizer(models_of([[["a", "b"]], [["c"]]], 3), transition=fixed_transition(2, per="second"))
     for i in range(40):
         found.update(WORDS[i % 4], i**2 / 7)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.errors import ModelError
-from placerec.hohmm import Transition, fixed_transition, learned_transition, motion, read_transitions
+from placerec.hohmm import Transition, fixed_transition, learned_transition, prediction, read_transitions
 
 kinds = st.integers(1, 4).flatmap(transitions)
 
@@ -48,19 +48,19 @@ def test_arrays_and_plain_floats_predict_alike(
 ) -> None:
     C = len(transition.matrix)
     belief = np.random.default_rng(seed).dirichlet(np.ones(C), len(elapsed)).T
-    steps = motion.motion(transition, np.array(elapsed, float), backwards=backwards)
+    steps = prediction.transition_steps(transition, np.array(elapsed, float), backwards=backwards)
     with np.errstate(divide="ignore"):
-        logs = motion.predict_logs(steps, np.log(belief), slice(None))
+        logs = prediction.predict_logs(steps, np.log(belief), slice(None))
     states = belief.copy()
-    steps.advance(states, slice(None))
+    steps.predict(states, slice(None))
     for t, count in enumerate(elapsed):
         matrix = plain_filter.power(transition.matrix, count)
         expected = (matrix @ belief[:, t]) if backwards else (belief[:, t] @ matrix)
         assert states[:, t] == pytest.approx(expected, abs=1e-12)
         assert np.exp(logs[:, t]) == pytest.approx(expected, abs=1e-12)
         if not backwards:
-            predict = motion.predictor(transition, count)
-            plainly = predict([motion.safe_log(b) for b in belief[:, t].tolist()])
+            predict = prediction.predictor(transition, count)
+            plainly = predict([prediction.safe_log(b) for b in belief[:, t].tolist()])
             assert np.exp(plainly) == pytest.approx(expected, abs=1e-12)
 
 

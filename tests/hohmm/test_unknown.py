@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from placerec.arrays import Floats
 from placerec.hohmm.filter import filter_stream
-from placerec.hohmm.smoothing import smooth
+from placerec.hohmm.posterior import forward_backward
 from placerec.hohmm.unknown import (
     CHAIN,
     DistanceModel,
@@ -111,7 +111,9 @@ def test_held_out_frames_tell_how_far_out_new_ones_lie() -> None:
 def unknown(ratios: list[float], places: int, steps: Floats, *, smoothed: bool = False) -> Floats:
     """The probability of the chain's first state."""
     log10_p = chain_evidence(np.array(ratios), places)
-    found: Floats = (smooth(log10_p, CHAIN, steps) if smoothed else filter_stream(log10_p, CHAIN, steps).belief)[:, 0]
+    found: Floats = (
+        forward_backward(log10_p, CHAIN, steps) if smoothed else filter_stream(log10_p, CHAIN, steps).belief
+    )[:, 0]
     return found
 
 

@@ -20,7 +20,7 @@ from placerec.experiments.store import WordsJob, load, save
 from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition
 from placerec.hohmm.decoder import warn_of_unlisted
 from placerec.hohmm.evidence import evidence_in
-from placerec.hohmm.offline import believe
+from placerec.hohmm.posterior import posterior
 from placerec.lm import BackoffModel, NgramCounts, count_ngrams
 from placerec.lm.backoff import unite_models
 from placerec.lm.trie import Trie
@@ -168,7 +168,7 @@ def _filtered(
     listed = frozenset(corpus.vocabulary)
     parts = evidence_in(stream, union, listed, selection=selection, per=transition.per, max_gap=None)
     evidence = next(parts)
-    belief, _ = believe(evidence, transition)
+    belief, _ = posterior(evidence, transition)
     return Beliefs.of(stream, tuple(corpus.sentences), belief, selected=evidence.selected)
 
 

@@ -20,14 +20,14 @@ MIXING = 1e-15
 CHUNK = 1 << 12
 
 
-class Motion(Protocol):
+class TransitionSteps(Protocol):
     """The prediction at each of T updates."""
 
     @property
     def mixes(self) -> bool:
         """Whether every prediction leaves every place more than MIXING."""
 
-    def advance(self, states: Floats, at: slice | Ints) -> None:
+    def predict(self, states: Floats, at: slice | Ints) -> None:
         """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
 
     def matrices(self, at: slice | Ints) -> Floats:
@@ -35,7 +35,7 @@ class Motion(Protocol):
 
 
 @dataclass(frozen=True)
-class Fading:
+class UniformMixing:
     """All places change alike: every belief goes towards 1/C; `kept` and `spread` float64 (T,), which sum to 1.
 
     `even`: they are the same for all updates.
@@ -48,11 +48,11 @@ class Fading:
 
     @property
     def mixes(self) -> bool:
-        """As `Motion` has it."""
+        """Whether every prediction leaves every place more than MIXING."""
         return not len(self.spread) or bool(self.spread.min() / self.places > MIXING)
 
-    def advance(self, states: Floats, at: slice | Ints) -> None:
-        """As `Motion` has it."""
+    def predict(self, states: Floats, at: slice | Ints) -> None:
+        """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
         # One number for all updates is ten times cheaper than a column of equal ones.
         kept, spread = (self.kept[:1], self.spread[:1]) if self.even else (self.kept[at], self.spread[at])
         shared = total(states)
@@ -61,13 +61,13 @@ class Fading:
         states += shared[..., None, :]
 
     def matrices(self, at: slice | Ints) -> Floats:
-        """As `Motion` has it."""
+        """The matrices (C, C, m) at m of the updates; the first index is the place before."""
         matrices: Floats = np.eye(self.places)[:, :, None] * self.kept[at] + self.spread[at] / self.places
         return matrices
 
 
 @dataclass(frozen=True)
-class Tabled:
+class MatrixSteps:
     """Any transitions: the `tables` float64 (C, C, U) that occur, rows the place before; `which` int64 (T,) is used."""
 
     tables: Floats = field(repr=False)
@@ -75,11 +75,11 @@ class Tabled:
 
     @cached_property
     def mixes(self) -> bool:
-        """As `Motion` has it."""
+        """Whether every prediction leaves every place more than MIXING."""
         return not len(self.which) or bool(self.tables.min() > MIXING)
 
-    def advance(self, states: Floats, at: slice | Ints) -> None:
-        """As `Motion` has it."""
+    def predict(self, states: Floats, at: slice | Ints) -> None:
+        """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
         tables = self.tables if self.tables.shape[2] == 1 else self.matrices(at)
         before = states.copy()
         np.multiply(before[..., 0, None, :], tables[0], out=states)
@@ -89,12 +89,12 @@ class Tabled:
             states += product
 
     def matrices(self, at: slice | Ints) -> Floats:
-        """As `Motion` has it."""
+        """The matrices (C, C, m) at m of the updates; the first index is the place before."""
         matrices: Floats = self.tables[:, :, self.which[at]]
         return matrices
 
 
-def motion(transition: Transition, elapsed: Floats, *, backwards: bool = False) -> Motion:
+def transition_steps(transition: Transition, elapsed: Floats, *, backwards: bool = False) -> TransitionSteps:
     """The predictions at T updates, each `elapsed` float64 (T,) steps after the one before.
 
     `backwards`: of evidence from later updates to earlier ones, so with the transposed matrices.
@@ -102,7 +102,7 @@ def motion(transition: Transition, elapsed: Floats, *, backwards: bool = False) 
     if transition.change is not None:
         even = bool((elapsed[:1] == elapsed).all())
         kept, spread = fade(transition.change, elapsed[:1] if even else elapsed)
-        return Fading(
+        return UniformMixing(
             len(transition.matrix), np.broadcast_to(kept, elapsed.shape), np.broadcast_to(spread, elapsed.shape), even
         )
     distinct, which = np.unique(elapsed, return_inverse=True)
@@ -111,17 +111,17 @@ def motion(transition: Transition, elapsed: Floats, *, backwards: bool = False) 
     for u, steps in enumerate(distinct.tolist()):
         matrix = transition.over(steps)
         tables[:, :, u] = matrix.T if backwards else matrix
-    return Tabled(tables, which.reshape(-1))
+    return MatrixSteps(tables, which.reshape(-1))
 
 
-def predict_logs(steps: Motion, logs: Floats, at: slice | Ints) -> Floats:
+def predict_logs(steps: TransitionSteps, logs: Floats, at: slice | Ints) -> Floats:
     """The prediction for logarithms (C, m), right for any transitions."""
     top = logs.max(axis=0)
     top = np.where(np.isfinite(top), top, 0.0)
     with np.errstate(divide="ignore"):
         if steps.mixes:
             states: Floats = np.exp(logs - top)
-            steps.advance(states, at)
+            steps.predict(states, at)
             return np.log(states) + top
         reached = logs[:, None] + np.log(steps.matrices(at))
         highest = np.where(np.isfinite(reached.max(axis=0)), reached.max(axis=0), 0.0)
@@ -129,17 +129,17 @@ def predict_logs(steps: Motion, logs: Floats, at: slice | Ints) -> Floats:
     return predicted
 
 
-def predict_beliefs(belief: Floats, transition: Transition, elapsed: Floats) -> Floats:
+def predicted_beliefs(belief: Floats, transition: Transition, elapsed: Floats) -> Floats:
     """What is believed just before each of T words, float64 (T, C): uniform, then the predictions of `belief` (T, C).
 
     `elapsed` float64 (T,): steps since the word before; the first is not used.
     """
     states = belief.T.copy()
     states[:, 1:], states[:, :1] = belief[:-1].T, 1 / belief.shape[1]
-    steps = motion(transition, elapsed[1:])
+    steps = transition_steps(transition, elapsed[1:])
     for start in range(0, len(belief) - 1, CHUNK):
         at = slice(start, min(start + CHUNK, len(belief) - 1))
-        steps.advance(states[:, 1:][:, at], at)
+        steps.predict(states[:, 1:][:, at], at)
     return states.T
 
 
@@ -162,7 +162,7 @@ def predictor(transition: Transition, steps: float) -> Predict:
 
 
 def matrix_predictor(matrix: Floats) -> Predict:
-    """The same with a matrix (C, C)."""
+    """The prediction by a matrix (C, C) for one log belief, plain floats in and out."""
     columns: list[list[float]] = matrix.T.tolist()
     if float(matrix.min()) > MIXING:
         return lambda log_belief: _mixed([exp(b) for b in log_belief], columns)
