@@ -13,7 +13,7 @@ models/KEY/          n-gram models of a comparison
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -167,21 +167,19 @@ def _describe(
 class WordsJob:
     """The words of one map, learned on the sequences `train`, and the token streams of these and of `test`.
 
-    `size`, `seed`, `units`: see `Dictionary.fit`. `cache`: the folder where all of it is kept.
+    `cache`: the folder where all of it is kept.
     """
 
     train: tuple[Described, ...]
     test: tuple[Described, ...]
-    size: int
-    seed: int
-    units: str
+    options: DictionaryOptions
     cache: Path
 
     @property
     def words(self) -> Path:
         """The dictionary's file."""
-        made_of = ([one.key for one in self.train], self.size, self.seed, self.units)
-        return self.cache / "words" / f"{key_of('words', *made_of)}.npz"
+        key = key_of("words", [one.key for one in self.train], asdict(self.options))
+        return self.cache / "words" / f"{key}.npz"
 
     @property
     def folder(self) -> Path:
@@ -206,8 +204,7 @@ class WordsJob:
         except VisionError:
             values = np.concatenate([one.load().values for one in self.train])
             spec = self.train[0].spec
-            options = DictionaryOptions(size=self.size, seed=self.seed, units=self.units)
-            Dictionary.fit(values, spec=spec, options=options).save(self.words)
+            Dictionary.fit(values, spec=spec, options=self.options).save(self.words)
         return Dictionary.load(self.words)
 
 

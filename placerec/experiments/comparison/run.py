@@ -27,7 +27,7 @@ from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.naming import own_name, unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
 from placerec.jobs import ProgressBar, silent
-from placerec.vision import DescriptorSpec
+from placerec.vision import DescriptorSpec, DictionaryOptions
 
 # Of the dictionary that methods use, and of a second one for those that ask for it.
 SPECS = (DescriptorSpec(), DescriptorSpec(kind="centrist"))
@@ -69,7 +69,7 @@ def compare(
             with progress(f"describe ({spec.kind})") as show:
                 described = describe_all([*training, *tests], spec, cache, progress=show)
                 both = tuple(described[: len(training)]), tuple(described[len(training) :])
-                encoded.append(encode(WordsJob(*both, size, seed, "live", cache)))
+                encoded.append(encode(WordsJob(*both, DictionaryOptions(size=size, seed=seed), cache)))
         models = train_models(encoded[0], len(training), cache)
         benchmark = Benchmark(encoded[0], len(training), models, seed, *encoded[1:])
         runs = {}

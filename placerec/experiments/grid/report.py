@@ -180,7 +180,7 @@ def _draw_words(job: WordsJob, path: Path) -> None:
     """Draw what the words look like among the test frames, as `placerec show-words` does."""
     sequences = [one.sequence for one in job.test]
     words = word_table(Descriptors.concat([one.load() for one in job.test]), Dictionary.load(job.words))
-    title = f"The words of S = {job.size}, seed {job.seed}, among the test frames"
+    title = f"The words of S = {job.options.size}, seed {job.options.seed}, among the test frames"
     draw_word_sheet(words, typical_images(words, sequences), path, title=title)
 
 

@@ -21,7 +21,7 @@ from placerec.frames import find_sequences
 from placerec.frames.folder import natural_key
 from placerec.frames.recordings import is_recording
 from placerec.jobs import ProgressBar, map_jobs, silent, workers
-from placerec.vision import DescriptorSpec
+from placerec.vision import DescriptorSpec, DictionaryOptions
 from placerec.words.folder import VOCABULARY, stream_files
 from placerec.words.stream import stream_name
 
@@ -73,7 +73,8 @@ def _image_jobs(plan: Config, out: Path, jobs: int, progress: ProgressBar) -> It
     todo = {}
     for size, seed, fold in product(plan.size, range(plan.seeds), folds):
         train, test = (tuple(of[name] for name in names) for names in (fold.train, fold.test))
-        todo[size, seed, fold.name] = WordsJob(train, test, size, seed, plan.units, out / "cache")
+        options = DictionaryOptions(size=size, seed=seed, units=plan.units)
+        todo[size, seed, fold.name] = WordsJob(train, test, options, out / "cache")
     missing = [job for job in todo.values() if not job.made]
     with progress("learn words") as show:
         map_jobs(make_tokens, missing, jobs=jobs, progress=show)
