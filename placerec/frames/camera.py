@@ -83,7 +83,10 @@ class Camera:
         return []
 
     def live_frames(self, stopped: Stopped) -> Iterator[LiveFrame]:
-        """Frames as they come, on the thread that asks for them; raises as `frames` does."""
+        """Frames as they come, on the thread that asks for them.
+
+        Raises SourceError for a camera that cannot be opened, or never gives an image.
+        """
         positions, began = count(), None
         with quiet(), _opened(self) as capture:
             for damaged in _grabbed(capture, stopped):

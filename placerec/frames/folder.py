@@ -28,7 +28,7 @@ WANTED = "images (" + " ".join(f"*{suffix}" for suffix in SUFFIXES) + ")"
 
 @dataclass(frozen=True)
 class Listing:
-    """What lies directly in a folder: names of images (in no order), of videos and bags (the same), and folders."""
+    """What lies directly in a folder: names of images and of videos and bags, in no order, and of folders."""
 
     images: tuple[str, ...]
     recordings: tuple[str, ...]

@@ -32,7 +32,7 @@ _DEPTHS = (8, 10, 12, 14, 16)
 
 
 def read_gray(path: Path | str) -> Gray:
-    """The grey levels 0..255 of an image file, (h, w), as `decode_gray` gives them.
+    """The grey levels 0..255 of an image file, (h, w): uint8, or float32 for 16 bits a channel.
 
     Raises SourceError naming the file and the reason: missing, unreadable, a pipe, and what `decode_gray` refuses.
     """

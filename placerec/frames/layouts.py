@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from placerec.errors import SourceError, at
-from placerec.files import read_text
+from placerec.files import read_lines
 from placerec.frames.places import PlaceList, check_place, read_places
 
 COLD_CAMERA, IDOL_CAMERA = "std_cam", "png"
@@ -106,7 +106,7 @@ def _floors(path: Path) -> set[str]:
 def _section(path: Path, floor: str) -> Iterator[tuple[int, list[str]]]:
     """The lines of a floor with their numbers, split at white space."""
     inside: str | None = None
-    for number, line in enumerate(read_text(path, SourceError).removeprefix("\ufeff").split("\n"), start=1):
+    for number, line in enumerate(read_lines(path, SourceError), start=1):
         fields = line.split()
         if not fields:
             continue

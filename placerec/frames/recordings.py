@@ -1,8 +1,7 @@
 """Videos and bags as sequences: their frames are listed, and labelled by NAME.labels.
 
-Grammar of NAME.labels: lines `start end place` in seconds.
-
-UTF-8; `#` begins a comment, blank lines mean nothing, lines in any order. An interval holds its start and not its end.
+Grammar of NAME.labels: lines `start end place` in seconds, in any order; UTF-8; `#` begins a comment, blank lines mean
+nothing. An interval holds its start and not its end.
 """
 
 import logging
@@ -15,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from placerec.errors import SourceError, at
-from placerec.files import read_text
+from placerec.files import read_lines
 from placerec.frames import bag, video
 from placerec.frames.places import check_place
 from placerec.frames.sequence import Frame, Recording, SourceOptions
@@ -77,7 +76,7 @@ def is_recording(path: Path) -> bool:
 def read_recording(path: Path, labels: Intervals | None, options: SourceOptions) -> tuple[tuple[Frame, ...], Recording]:
     """The frames of a video or a bag in order of time, called after their numbers, and what their images come from.
 
-    Raises as `video.list_times` and `bag.list_bag` do.
+    Raises SourceError for what cannot be read as one, MissingExtraError for a bag without rosbags.
     """
     if bag.is_bag(path):
         topic, ranks, stamps = bag.list_bag(path, options.topic)
@@ -95,7 +94,7 @@ def read_intervals(path: Path) -> Intervals:
     name that cannot be a place's.
     """
     found = []
-    for number, line in enumerate(read_text(path, SourceError).removeprefix("\ufeff").split("\n"), start=1):
+    for number, line in enumerate(read_lines(path, SourceError), start=1):
         fields = line.partition("#")[0].split()
         if fields:
             found.append(_interval(path, number, fields))

@@ -4,6 +4,7 @@ from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from operator import eq
 from typing import Self, overload
 
 import numpy as np
@@ -38,14 +39,14 @@ class _Strings(Sequence[str]):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Sequence) or isinstance(other, str):
             return NotImplemented
-        return len(self) == len(other) and all(mine == its for mine, its in zip(self, other, strict=True))
+        return len(self) == len(other) and all(map(eq, self, other))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} strings)"
 
 
 class Texts(_Strings):
-    """Strings one behind the other: each takes its length and eight bytes, where a list takes a hundred more."""
+    """Strings one behind the other: eight bytes each beside their own, where a list takes a hundred."""
 
     def __init__(self, texts: Iterable[str] = ()) -> None:
         joined, ends = bytearray(), array("q", [0])

@@ -90,7 +90,7 @@ def describe(
 
     `spec`: None is the default one, or what `matrix` holds. `matrix`: a .npy or .npz file of descriptors that were
     computed elsewhere (`external.read_rows`); no image is read then. `work`: who does the work (`jobs.workers`), None
-    for threads; the result is the same with any. `progress` is called with frames done and in all. Raises VisionError
+    for threads; the result does not depend on it. `progress` is called with frames done and in all. Raises VisionError
     if no image can be read, or if the matrix cannot be used or holds other descriptors than `spec` wants.
     """
     sequences = list(sequences)
@@ -110,7 +110,11 @@ def described(
     journal: Journal | None = None,
     progress: Progress | None = None,
 ) -> Iterator[tuple[FrameTable, Singles]]:
-    """Batch after batch the frames that have a descriptor, and these (m, spec.length); else as `describe`."""
+    """Batch after batch the frames that have a descriptor, and the descriptors (m, spec.length).
+
+    What could not be read is named in warnings and counted in `counts`. `journal`: gives back the batches of a run that
+    was cut short, and keeps the others.
+    """
     check_describes_images(spec)
     function = partial(describe_batch, spec)
     for batch, result in process_batches(
@@ -142,7 +146,7 @@ def keep_described(
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> KeptDescriptors:
-    """Describe the frames as `describe` does; the descriptors are left in the journal."""
+    """Describe every frame; the descriptors are left in the journal, where `describe` holds them in memory."""
     counts = FrameCounts()
     found = described(sequences, spec, counts, work=work, journal=journal, progress=progress)
     return KeptDescriptors(spec, FrameTable.concat(table for table, _ in found), counts, journal)

@@ -65,7 +65,7 @@ class Pca:
 
 
 def moments(source: Source, work: Executor | None = None) -> Moments:
-    """The moments of (n, d) float32 in one pass, from memory, a memory map or a stream; the same however it is cut.
+    """The moments of (n, d) float32 in one pass, from memory, a memory map or a stream, however that is cut.
 
     `work`: other machines, if there are any, take the chunks.
     """
@@ -105,7 +105,7 @@ def fit_pca(data: Moments, components: int = 80) -> Pca:
 
 
 def project(rows: Singles, pca: Pca) -> Singles:
-    """Coordinates float32 (n, k) of rows (n, d); a row's are the same whatever other rows are there."""
+    """Coordinates float32 (n, k) of rows (n, d); a row's do not depend on the other rows."""
     codes = np.empty((len(rows), len(pca.components)), np.float32)
     for first in range(0, len(rows), CHUNK):
         piece = slice(first, first + CHUNK)

@@ -82,8 +82,8 @@ def train_som(
     learn = {"batch": _batch, "online": _online}[rule]
     codebook, epochs = learn(source, n, codebook, rng, width, epochs, progress)
     hits = np.zeros(size * size, np.int64)
-    for its in each_chunk(source)(partial(_hits, Units.of(codebook))):
-        hits += its
+    for counts in each_chunk(source)(partial(_hits, Units.of(codebook))):
+        hits += counts
     check_again(int(hits.sum()), n)
     return Som(codebook, hits, epochs)
 
@@ -216,10 +216,10 @@ def torn(codes: Singles, codebook: Singles, nearest: Ints) -> Mask:
 def _spread(source: Source) -> tuple[int, Floats, Floats]:
     """The number of rows, and mean and standard deviation of every column, in one pass (Chan's formula)."""
     n, mean, squares = 0, np.zeros(1), np.zeros(1)
-    for m, here, its in each_chunk(source)(_spread_of):
-        step = here - mean
+    for m, mean_here, squares_here in each_chunk(source)(_spread_of):
+        step = mean_here - mean
         total = n + m
-        squares = squares + its + step**2 * (n * m / total)
+        squares = squares + squares_here + step**2 * (n * m / total)
         mean = mean + step * (m / total)
         n = total
     return n, mean, np.sqrt(squares / n)
@@ -335,8 +335,8 @@ def map_quality(source: Source, codebook: Singles, hits: Ints) -> MapQuality:
     """
     falls = np.zeros(len(codebook), np.int64)
     distance, apart = 0.0, 0
-    for its, far, loose in each_chunk(source)(partial(_fall, codebook)):
-        falls += its
+    for counts, far, loose in each_chunk(source)(partial(_fall, codebook)):
+        falls += counts
         distance += far
         apart += loose
     n = int(falls.sum())

@@ -173,9 +173,9 @@ def _found(
 
     given = with_images(handed_out(), lambda image: _shrunk(image, spec))
     for result in work(function, map(_absolute, given) if isinstance(work, RemoteExecutor) else given):
-        batch, its = pending.popleft()
+        batch, key_of_batch = pending.popleft()
         if journal is not None:
-            journal.add(its, result.pack())
+            journal.add(key_of_batch, result.pack())
         yield batch, result
 
 

@@ -34,8 +34,8 @@ def tokenize(
     """`placerec tokenize`: write the tokens folder `out` (one .tsv per sequence, vocab.txt) of image sources.
 
     `words`: the words.npz to use. `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed
-    elsewhere (`describe`). `work`: who does the work (`jobs.workers`), None for threads; the bytes are the same with
-    any. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes on from
+    elsewhere (`describe`). `work`: who does the work (`jobs.workers`), None for threads; the bytes do not depend on
+    it. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes on from
     there.
     """
     dictionary = Dictionary.load(Path(words))
@@ -57,7 +57,7 @@ def streams_of(
 ) -> list[WordStream]:
     """The token streams of image sources: each frame's best-matching unit in `dictionary`.
 
-    `matrix`, `work`: as for `tokenize`. Raises VisionError for a dictionary that needs a matrix if there is none.
+    `matrix`, `work`: see `tokenize`. Raises VisionError for a dictionary that needs a matrix if there is none.
     """
     pieces: dict[str, list[WordStream]] = {}
     for part in _parts(sources, dictionary, matrix, source_options, work, None, progress):

@@ -9,56 +9,57 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from helpers.recordings import START, STEP, Message, compressed, cut, grays, jpeg, pictures, raw, stream, write_bag
+from helpers.recordings import (
+    START,
+    STEP,
+    Message,
+    compressed,
+    cut,
+    find_one,
+    grays,
+    jpeg,
+    pictures,
+    raw,
+    read_images,
+    stream,
+    write_bag,
+)
 
 from placerec.errors import MissingExtraError, SourceError
-from placerec.frames import Sequence, SourceOptions, find_sequences, images_at, read_gray
-from placerec.frames.sequence import Gray
+from placerec.frames import find_sequences, images_at, read_gray
 
 pytest.importorskip("rosbags")
 TOPIC = "/camera/image_raw"
 
 
-def found(path: Path, topic: str | None = None, every: int = 1) -> Sequence:
-    (sequence,) = find_sequences([path], options=SourceOptions(topic=topic, every=every))
-    return sequence
-
-
-def read(sequence: Sequence, first: int = 0) -> list[Gray | str]:
-    assert sequence.recording is not None
-    images = list(sequence.recording.frames(first))
-    assert [frame for frame, _ in images] == list(sequence.frames[first:])
-    return [gray for _, gray in images]
-
-
 def failure(path: Path, topic: str | None = None) -> str:
     with pytest.raises(SourceError) as error:
-        found(path, topic)
+        find_one(path, topic=topic)
     return str(error.value)
 
 
 @pytest.mark.parametrize("storage", ["ros1", "sqlite3", "mcap"])
 def test_every_kind_of_bag(tmp_path: Path, storage: str) -> None:
     path = write_bag(tmp_path / ("run.bag" if storage == "ros1" else "run"), {TOPIC: stream()}, storage)
-    sequence = found(path)
+    sequence = find_one(path)
     assert (sequence.name, sequence.source) == ("run", path)
     assert [frame.name for frame in sequence.frames] == [f"{i:06d}" for i in range(20)]
     assert [frame.time for frame in sequence.frames] == [(START + i * STEP) / 1e9 for i in range(20)]
     expected = grays(pictures())
-    assert all(map(np.array_equal, read(sequence), expected))
-    assert all(map(np.array_equal, read(sequence, 13), expected[13:]))
+    assert all(map(np.array_equal, read_images(sequence), expected))
+    assert all(map(np.array_equal, read_images(sequence, 13), expected[13:]))
     assert all(map(np.array_equal, images_at(sequence, [3, 4, 17]), [expected[i] for i in (3, 4, 17)]))
-    some = found(path, every=6)
+    some = find_one(path, every=6)
     assert some.frames == sequence.frames[::6]
-    assert all(map(np.array_equal, read(some, 1), expected[6::6]))
-    assert read(sequence, 20) == []
+    assert all(map(np.array_equal, read_images(some, 1), expected[6::6]))
+    assert read_images(sequence, 20) == []
     assert repr(some.recording) == f"Bag(path={path!r}, topic={TOPIC!r}, every=6)"
     again = pickle.loads(pickle.dumps(some))  # noqa: S301
     assert again == some
-    assert len(read(again)) == 4
+    assert len(read_images(again)) == 4
     if storage != "ros1":
         (file,) = [file for file in path.iterdir() if file.suffix in (".db3", ".mcap")]
-        assert all(map(np.array_equal, read(found(file)), expected))
+        assert all(map(np.array_equal, read_images(find_one(file)), expected))
         assert again.recording.files() == sorted(path.iterdir())
     else:
         assert again.recording.files() == [path]
@@ -73,7 +74,7 @@ def test_compressed_images_have_the_levels_of_their_files(tmp_path: Path, storag
     files += [files[0][:-300], b"", b"no picture"]
     path = tmp_path / ("run.bag" if storage == "ros1" else "run")
     write_bag(path, {"/c": [compressed(data, START + i * STEP) for i, data in enumerate(files)]}, storage)
-    levels = read(found(path))
+    levels = read_images(find_one(path))
     for data, gray in zip(files[:5], levels, strict=False):
         (tmp_path / "one").write_bytes(data)
         assert np.array_equal(gray, read_gray(tmp_path / "one"))
@@ -93,14 +94,14 @@ def test_compression_of_bags(tmp_path: Path) -> None:
     for mode in (CompressionMode.FILE, CompressionMode.MESSAGE):
         path = tmp_path / mode.name
         write_bag(path, {TOPIC: stream()}, "sqlite3", set_compression=(mode, CompressionFormat.ZSTD))
-        assert all(map(np.array_equal, read(found(path)), expected))
+        assert all(map(np.array_equal, read_images(find_one(path)), expected))
     storage = (CompressionMode.STORAGE, CompressionFormat.ZSTD)
     path = write_bag(tmp_path / "m", {TOPIC: stream()}, "mcap", set_compression=storage)
-    assert all(map(np.array_equal, read(found(path)), expected))
+    assert all(map(np.array_equal, read_images(find_one(path)), expected))
     for kind in Writer1.CompressionFormat:
         path = tmp_path / f"{kind.name}.bag"
         write_bag(path, {TOPIC: stream()}, "ros1", set_compression=(kind,))
-        assert all(map(np.array_equal, read(found(path)), expected))
+        assert all(map(np.array_equal, read_images(find_one(path)), expected))
 
 
 def test_topics(tmp_path: Path) -> None:
@@ -108,13 +109,13 @@ def test_topics(tmp_path: Path) -> None:
     few = [compressed(jpeg(pictures(1)[0]))]
     path = write_bag(tmp_path / "both", {"/b": stream(2), "/a": few, "/talk": text})
     assert failure(path) == f"{path}: has several topics of images: /a, /b; choose one (--topic)"
-    assert [len(found(path, topic).frames) for topic in ("/a", "b", "/b")] == [1, 2, 2]
+    assert [len(find_one(path, topic=topic).frames) for topic in ("/a", "b", "/b")] == [1, 2, 2]
     assert failure(path, "/c") == f"{path}: has no topic /c; its topics of images are: /a, /b"
     assert failure(path, "/talk") == (
         f"{path}: /talk is of std_msgs/msg/String, not of images; its topics of images are: /a, /b"
     )
     one = write_bag(tmp_path / "one", {"/b": stream(2), "/talk": text})
-    assert found(one).recording == found(one, "/b").recording
+    assert find_one(one).recording == find_one(one, topic="/b").recording
     none = write_bag(tmp_path / "none", {"/talk": text})
     assert failure(none) == f"{none}: has no topic of images; its topics are: /talk (std_msgs/msg/String)"
     assert failure(none, "/talk").endswith("its topics of images are: none")
@@ -134,11 +135,11 @@ def test_frames_are_in_the_order_of_their_stamps(tmp_path: Path, storage: str) -
         for n, i in enumerate(order)
     ]
     path = write_bag(tmp_path / ("run.bag" if storage == "ros1" else "run"), {TOPIC: messages}, storage)
-    sequence = found(path)
+    sequence = find_one(path)
     assert [frame.time for frame in sequence.frames] == [(START + i * STEP) / 1e9 for i in range(10)]
-    assert all(map(np.array_equal, read(sequence), grays(shown)))
-    assert all(map(np.array_equal, read(sequence, 2), grays(shown)[2:]))
-    assert all(map(np.array_equal, read(found(path, every=3)), grays(shown)[::3]))
+    assert all(map(np.array_equal, read_images(sequence), grays(shown)))
+    assert all(map(np.array_equal, read_images(sequence, 2), grays(shown)[2:]))
+    assert all(map(np.array_equal, read_images(find_one(path, every=3)), grays(shown)[::3]))
 
 
 def test_without_stamps_or_with_a_clock_that_was_set_it_counts_when_messages_were_stored(
@@ -153,9 +154,9 @@ def test_without_stamps_or_with_a_clock_that_was_set_it_counts_when_messages_wer
         return write_bag(tmp_path / name, {TOPIC: messages})
 
     expected = [when / 1e9 for when in stored]
-    assert [frame.time for frame in found(bag("zero", [0] * 220)).frames] == expected
+    assert [frame.time for frame in find_one(bag("zero", [0] * 220)).frames] == expected
     back = bag("back", [when if i < 110 else when - 10**15 for i, when in enumerate(stored)])
-    assert [frame.time for frame in found(back).frames] == expected
+    assert [frame.time for frame in find_one(back).frames] == expected
     assert f"{back}: the stamps on {TOPIC} jump; the times are those at which images were stored" in caplog.messages
 
 
@@ -190,14 +191,14 @@ def test_what_a_bag_damaged_in_the_middle_still_gives(tmp_path: Path, caplog: py
     # Within the second of four pieces, and not in its index.
     data[len(data) * 2 // 5 : len(data) // 2] = bytes(len(data) // 2 - len(data) * 2 // 5)
     path.write_bytes(bytes(data))
-    sequence = found(path)
+    sequence = find_one(path)
     count = len(sequence.frames)
     assert 0 < count < 400
     said = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
     assert len(said) == 1
     assert said[0].startswith(f"{path}: is damaged behind {count} images (")
     assert said[0].endswith("); the rest is not read")
-    assert all(map(np.array_equal, read(sequence), grays(pictures(400))))
+    assert all(map(np.array_equal, read_images(sequence), grays(pictures(400))))
 
 
 def test_a_bag_in_pieces_that_lacks_one(tmp_path: Path) -> None:
@@ -209,7 +210,7 @@ def test_a_bag_in_pieces_that_lacks_one(tmp_path: Path) -> None:
     assert "lost.mcap" in failure(path)
     (path / "metadata.yaml").unlink()
     # Without it the folder is one of recordings.
-    assert [frame.path for frame in found(path).frames] == [path / "run.mcap"] * 3
+    assert [frame.path for frame in find_one(path).frames] == [path / "run.mcap"] * 3
 
 
 def test_a_message_that_cannot_be_parsed_is_named(tmp_path: Path) -> None:
@@ -221,7 +222,7 @@ def test_a_message_that_cannot_be_parsed_is_named(tmp_path: Path) -> None:
         link = writer.add_connection(TOPIC, "sensor_msgs/msg/Image", typestore=store)
         for data in (b"", b"\0\1\0\0", bytes(30), b"\xff" * 100):
             writer.write(link, START, data)
-    levels = read(found(tmp_path / "run"))
+    levels = read_images(find_one(tmp_path / "run"))
     assert [f"frame 00000{i} of {TOPIC}" in str(gray) for i, gray in enumerate(levels)] == [True] * 4
 
 
@@ -238,4 +239,4 @@ def test_without_rosbags_it_is_said_how_to_get_it(tmp_path: Path, monkeypatch: p
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(MissingExtraError, match=r"needs the package rosbags.*pip install 'placerec\[bag\]'"):
-        found(path)
+        find_one(path)

@@ -13,7 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from helpers.image_files import chunk, encode
 
 from placerec.errors import SourceError
 from placerec.frames import read_gray
@@ -29,12 +29,6 @@ def _silence(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
     assert capfd.readouterr() == ("", "")
 
 
-def encode(suffix: str, pixels: NDArray[Any], *options: int) -> bytes:
-    ok, data = cv2.imencode(suffix, pixels, options)
-    assert ok
-    return data.tobytes()
-
-
 def write(path: Path, data: bytes) -> Path:
     path.write_bytes(data)
     return path
@@ -47,10 +41,6 @@ def failure(path: Path) -> str:
     assert message.startswith(f"{path}: ")
     assert "\n" not in message
     return message.removeprefix(f"{path}: ")
-
-
-def chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def exif(orientation: int) -> bytes:

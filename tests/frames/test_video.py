@@ -12,11 +12,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from helpers.recordings import cut, decoded, pictures, write_video
+from helpers.recordings import cut, decoded, find_one, pictures, read_images, write_video
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
-from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at
+from placerec.frames import Frame, SourceOptions, find_sequences, images_at
 from placerec.frames.sequence import Gray
 from placerec.frames.video import SUFFIXES, _decoded, _increasing, _walked, list_times
 
@@ -37,19 +37,6 @@ KINDS = [
 ]
 
 
-def found(path: Path, **source_options: object) -> Sequence:
-    (sequence,) = find_sequences([path], options=SourceOptions(**source_options))  # type: ignore[arg-type]
-    assert sequence.recording is not None
-    return sequence
-
-
-def read(sequence: Sequence, first: int = 0) -> list[Gray | str]:
-    assert sequence.recording is not None
-    images = list(sequence.recording.frames(first))
-    assert [frame for frame, _ in images] == list(sequence.frames[first:])
-    return [gray for _, gray in images]
-
-
 def equal(one: list[Gray | str], other: list[NDArray[np.uint8]]) -> bool:
     return len(one) == len(other) and all(map(np.array_equal, one, other))
 
@@ -57,28 +44,28 @@ def equal(one: list[Gray | str], other: list[NDArray[np.uint8]]) -> bool:
 @pytest.mark.parametrize(("name", "codec"), KINDS)
 def test_frames_are_those_that_decoding_gives(tmp_path: Path, name: str, codec: str) -> None:
     path = write_video(tmp_path / name, codec)
-    sequence = found(path)
+    sequence = find_one(path)
     assert (sequence.name, sequence.source) == ("run", path)
     assert [frame.name for frame in sequence.frames] == [f"{i:06d}" for i in range(20)]
     assert np.allclose([frame.time for frame in sequence.frames], np.arange(20) / 10, atol=1e-6)
     assert {(frame.place, frame.path) for frame in sequence.frames} == {("", path)}
     whole = decoded(path)
-    assert equal(read(sequence), whole)
+    assert equal(read_images(sequence), whole)
     # Skipping and starting late change nothing of what is read.
     for every in (3, 19, 20):
-        some = found(path, every=every)
+        some = find_one(path, every=every)
         assert some.frames == sequence.frames[::every]
-        assert equal(read(some), whole[::every])
-        assert equal(read(some, 1), whole[every::every])
-    assert equal(read(sequence, 7), whole[7:])
-    assert read(sequence, 20) == read(sequence, 25) == []
+        assert equal(read_images(some), whole[::every])
+        assert equal(read_images(some, 1), whole[every::every])
+    assert equal(read_images(sequence, 7), whole[7:])
+    assert read_images(sequence, 20) == read_images(sequence, 25) == []
 
 
 def test_levels_are_close_to_those_that_were_written(tmp_path: Path) -> None:
     written = [cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) for picture in pictures()]
     off = [
         np.abs(np.subtract(a, b, dtype=np.int16)).max()
-        for a, b in zip(read(found(write_video(tmp_path / "run.mkv", "FFV1"))), written, strict=True)
+        for a, b in zip(read_images(find_one(write_video(tmp_path / "run.mkv", "FFV1"))), written, strict=True)
         if not isinstance(a, str)
     ]
     assert len(off) == 20
@@ -87,18 +74,18 @@ def test_levels_are_close_to_those_that_were_written(tmp_path: Path) -> None:
 
 def test_a_recording_can_be_sent_to_another_process_and_tells_what_it_reads(tmp_path: Path) -> None:
     path = write_video(tmp_path / "run.mp4")
-    sequence = found(path, every=4)
+    sequence = find_one(path, every=4)
     assert repr(sequence.recording) == f"Video(path={path!r}, every=4)"
     again = pickle.loads(pickle.dumps(sequence))  # noqa: S301
     assert again == sequence
-    assert equal(read(again), decoded(path)[::4])
+    assert equal(read_images(again), decoded(path)[::4])
     assert again.recording.files() == [path]
     assert not again.recording.endless
 
 
 def test_the_images_of_some_frames(tmp_path: Path) -> None:
     path = write_video(tmp_path / "run.mp4")
-    sequence, whole = found(path), decoded(path)
+    sequence, whole = find_one(path), decoded(path)
     assert equal(list(images_at(sequence, [2, 3, 11, 19])), [whole[i] for i in (2, 3, 11, 19)])
     assert list(images_at(sequence, [])) == []
 
@@ -108,9 +95,9 @@ def test_a_truncated_video_gives_what_it_has(
     tmp_path: Path, name: str, codec: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = cut(write_video(tmp_path / name, codec, pictures(60)), 0.7, f"short{Path(name).suffix}")
-    sequence = found(path)
+    sequence = find_one(path)
     assert 20 < len(sequence.frames) < 50
-    assert equal(read(sequence), decoded(path))
+    assert equal(read_images(sequence), decoded(path))
     (said,) = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
     assert said.startswith(f"{path}: is truncated or damaged: {len(sequence.frames)} frames up to second ")
     assert said.endswith("are there, of about 60 up to second 6.0")
@@ -123,8 +110,8 @@ def test_a_frame_that_cannot_be_decoded_is_named_and_the_rest_is_read(tmp_path: 
     middle = len(data) // 2
     data[middle : middle + 400] = b"\xff" * 400
     path.write_bytes(bytes(data))
-    sequence = found(path)
-    grays = read(sequence)
+    sequence = find_one(path)
+    grays = read_images(sequence)
     assert len(sequence.frames) == len(grays) == 60
     bad = [(frame.name, gray) for frame, gray in zip(sequence.frames, grays, strict=True) if isinstance(gray, str)]
     assert 0 < len(bad) < 10
@@ -151,21 +138,21 @@ def test_times_that_vary(tmp_path: Path) -> None:
         changed = changed[:at] + struct.pack(">I", struct.unpack_from(">I", changed, at)[0] + 8) + changed[at + 4 :]
     # The header's duration is 2 s, and an edit list would cut the rest off: it is made a box of no meaning.
     path.write_bytes(changed.replace(b"edts", b"free"))
-    sequence = found(path)
+    sequence = find_one(path)
     expected = [*np.arange(10) / 10, *(1 + 0.3 * np.arange(10))]
     assert np.allclose([frame.time for frame in sequence.frames], expected, atol=1e-5)
-    assert equal(read(sequence), decoded(path))
+    assert equal(read_images(sequence), decoded(path))
 
 
 def test_a_rotated_video_is_turned(tmp_path: Path) -> None:
     """The matrix in an MP4's track header says that the picture is to be turned by 90 degrees."""
     path = write_video(tmp_path / "run.mp4", "mp4v")
-    upright = read(found(path))
+    upright = read_images(find_one(path))
     data = bytearray(path.read_bytes())
     matrix = data.index(b"tkhd") + 4 + 40
     struct.pack_into(">9i", data, matrix, 0, 1 << 16, 0, -(1 << 16), 0, 0, 0, 0, 1 << 30)
     path.write_bytes(bytes(data))
-    turned = read(found(path))
+    turned = read_images(find_one(path))
     assert equal(turned, [np.rot90(gray, -1) for gray in upright if not isinstance(gray, str)])
 
 
@@ -196,7 +183,7 @@ def test_what_is_no_video(tmp_path: Path) -> None:
 
 def test_a_video_too_small_to_be_described_says_so_of_every_frame(tmp_path: Path) -> None:
     path = write_video(tmp_path / "run.avi", "MJPG", frames=pictures(3, 6, 16))
-    grays = read(found(path))
+    grays = read_images(find_one(path))
     assert grays[0] == f"{path}: frame 000000: is 16x6 pixels, and 8 a side are needed; remove it"
 
 

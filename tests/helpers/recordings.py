@@ -8,6 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.frames import Sequence as FrameSequence
+from placerec.frames import SourceOptions, find_sequences
+from placerec.frames.sequence import Gray
+
 Picture = NDArray[np.uint8]
 START = 1_700_000_000 * 10**9
 STEP = 10**8
@@ -23,6 +27,20 @@ def pictures(count: int = 20, height: int = 48, width: int = 64) -> list[Picture
 
 def grays(found: Sequence[Picture]) -> list[NDArray[Any]]:
     return [cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) for picture in found]
+
+
+def find_one(path: Path, **options: Any) -> FrameSequence:
+    """The only sequence in a recording, read with these `SourceOptions`."""
+    (sequence,) = find_sequences([path], options=SourceOptions(**options))
+    return sequence
+
+
+def read_images(sequence: FrameSequence, first: int = 0) -> list[Gray | str]:
+    """The grey levels of a recording's frames from one on, which must be those that the sequence lists."""
+    assert sequence.recording is not None
+    images = list(sequence.recording.frames(first))
+    assert [frame for frame, _ in images] == list(sequence.frames[first:])
+    return [gray for _, gray in images]
 
 
 def write_video(path: Path, codec: str = "mp4v", frames: Sequence[Picture] | None = None, rate: float = 10) -> Path:

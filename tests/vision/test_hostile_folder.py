@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.image_files import chunk
 from helpers.small_world import write_images
 
 from placerec.errors import VisionError
@@ -20,10 +21,6 @@ from placerec.vision import DescriptorSpec, describe, describe_sources
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no such files there")
 SPEC = DescriptorSpec(image_size=16)
-
-
-def chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def bomb(side: int) -> bytes:

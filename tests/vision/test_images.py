@@ -2,12 +2,11 @@
 
 import logging
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from helpers.image_files import encode
 
 from placerec.errors import VisionError
 from placerec.frames import Frame, Sequence
@@ -15,12 +14,6 @@ from placerec.vision import DescriptorSpec, describe, fit_image
 
 TEXTURE = np.random.default_rng(0).integers(0, 256, (30, 40), np.uint8)
 TWELVE = np.random.default_rng(0).integers(0, 4096, (30, 40), np.uint16)
-
-
-def encode(suffix: str, pixels: NDArray[Any]) -> bytes:
-    ok, data = cv2.imencode(suffix, pixels)
-    assert ok
-    return data.tobytes()
 
 
 CONSTANT = encode(".png", np.full((30, 40), 90, np.uint8))
