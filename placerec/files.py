@@ -52,12 +52,13 @@ def whole_file(path: Path) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
-def sweep_files(path: Path) -> None:
-    """Remove what killed runs of `whole_file` left beside `path`; what a run is writing now stays."""
+def sweep_files(folder: Path, name: str | None = None) -> None:
+    """Remove what killed runs of `whole_file` left in a folder, of the file `name` or of all; what is written stays."""
+    of, suffix = (".+", r"(\..*)?") if name is None else (re.escape(name), re.escape(Path(name).suffix))
     # The eight characters are those of mkstemp; a journal's name has others.
-    name = re.compile(re.escape(PARTIAL.format(path.name)) + "[a-z0-9_]{8}" + re.escape(path.suffix))
-    for entry in path.parent.iterdir():
-        if name.fullmatch(entry.name) and entry.is_file():
+    partial = re.compile(re.escape(PARTIAL).replace(r"\{\}", of) + "[a-z0-9_]{8}" + suffix)
+    for entry in folder.iterdir():
+        if partial.fullmatch(entry.name) and entry.is_file():
             lock = _lock(entry)
             if lock is not None:
                 entry.unlink(missing_ok=True)

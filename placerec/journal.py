@@ -73,7 +73,7 @@ def open_journal(output: Path) -> Iterator[Journal]:
     path = path.parent / (PARTIAL.format(path.name) + "journal")
     keep = False
     file, named = _opened(path, output)
-    sweep_files(output.resolve())
+    sweep_files(output.resolve().parent, output.resolve().name)
     try:
         with file:
             yield Journal(file, output)

@@ -19,6 +19,7 @@ from placerec.files import (
     held_folder,
     read_text,
     restore_folder,
+    sweep_files,
     whole_file,
     whole_folder,
     write_text,
@@ -291,6 +292,20 @@ def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
         (partial / "whole.tsv").write_text("whole")
     assert names(tmp_path) == ["out"]
     assert names(folder) == ["whole.tsv"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs locks on files")
+def test_partial_files_of_killed_runs_go_and_those_being_written_stay(tmp_path: Path) -> None:
+    left = [".a.npz.partial-abcd_123.npz", ".b.partial-00000000"]
+    kept = [".a.npz.partial-journal", ".c.partial-toolong123", "a.npz"]
+    for name in (*left, *kept):
+        (tmp_path / name).write_text("")
+    (tmp_path / ".d.partial-abcdefgh").mkdir()
+    with whole_file(tmp_path / "a.npz") as partial:
+        sweep_files(tmp_path, "a.npz")
+        assert names(tmp_path) == sorted([left[1], *kept, ".d.partial-abcdefgh", partial.name])
+        sweep_files(tmp_path)
+        assert names(tmp_path) == sorted([*kept, ".d.partial-abcdefgh", partial.name])
 
 
 def test_text_is_utf8_with_line_feeds_and_gzip_without_a_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from placerec.errors import ExperimentError, OutputError, PlacerecError, VisionError
-from placerec.files import content_digest, content_digest_of_file, held_folder, read_text, write_text
+from placerec.files import content_digest, content_digest_of_file, held_folder, read_text, sweep_files, write_text
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import files_of
 from placerec.frames.table import FrameTable
@@ -68,9 +68,7 @@ def held_output(out: Path, cache: Path) -> Iterator[None]:
             raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
     with held_folder(out):
         for folder in (out, *(out / "cache").glob("*/")):
-            for path in folder.glob(".*.partial-*"):
-                if path.is_file():
-                    path.unlink(missing_ok=True)
+            sweep_files(folder)
         yield
 
 
