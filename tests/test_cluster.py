@@ -78,7 +78,7 @@ def dying(machines: LocalDask, after: int) -> Iterator[Dying]:
 @pytest.fixture(autouse=True)
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nine batches of the images below, nine chunks of their descriptors; some words of a text."""
-    monkeypatch.setattr("placerec.frames.images.SIZE", 8)
+    monkeypatch.setattr("placerec.frames.images.BATCH", 8)
     monkeypatch.setattr("placerec.vision.chunks.CHUNK", 8)
     monkeypatch.setattr("placerec.lm.counts.BLOCK", 40)
 
