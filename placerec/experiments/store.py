@@ -82,7 +82,7 @@ class Described:
 
     @property
     def key(self) -> str:
-        """The digest."""
+        """The digest of images and descriptor, 64 hexadecimal digits."""
         return self.kept.stem
 
     def load(self) -> Descriptors:

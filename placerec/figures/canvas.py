@@ -70,7 +70,8 @@ def figure_file(path: Path | str, width: float, height: float) -> "Iterator[Figu
 def picture_file(out: Path | str | None) -> Iterator[Path | None]:
     """Where to draw the picture of a command, or None where none is wanted; it is at `out` when the block ends.
 
-    That it cannot be drawn or written is found out before the block. Raises as `check_figure` and `whole_file`.
+    Raises, before the block, OutputError for a suffix of no picture and for a path that cannot be written, and
+    MissingExtraError without matplotlib.
     """
     if out is None:
         yield None
@@ -81,7 +82,7 @@ def picture_file(out: Path | str | None) -> Iterator[Path | None]:
 
 
 def check_figure(path: Path | str) -> None:
-    """Raise what `figure_file` would, of suffix and matplotlib: before an hour of work, and not after it."""
+    """Raise OutputError for a suffix of no picture, MissingExtraError without matplotlib: before any work."""
     if Path(path).suffix.lower() not in _METADATA:
         raise OutputError(f"{path}: no kind of picture; let its name end in .png, .svg or .pdf")
     check_optional("matplotlib", "a picture")

@@ -81,7 +81,8 @@ def show_frame(
     """`placerec show-frame`: what a words.npz sees in an image, and which units are nearest to it.
 
     `sources`: sequences whose frames tell what the units look like and which places they belong to. `out`: the
-    picture to draw. Raises as `show_words` does, and SourceError or VisionError for an image that cannot be used.
+    picture to draw, PNG, SVG or PDF by suffix. Raises SourceError and VisionError for what cannot be read, OutputError
+    for a picture that cannot be written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
         dictionary = Dictionary.load(words)

@@ -65,8 +65,8 @@ def show_words(
     """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
 
     `out`: the picture to draw, PNG, SVG or PDF by suffix. `matrix`: the frames' descriptors, for a dictionary of
-    descriptors that were computed elsewhere (`describe`). Raises what `find_sequences`, `describe` and
-    `draw_word_sheet` raise.
+    descriptors that were computed elsewhere (`describe`). Raises SourceError and VisionError for what cannot be read,
+    OutputError for a picture that cannot be written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
         dictionary = Dictionary.load(words)

@@ -29,8 +29,8 @@ def stability(
 ) -> Stability:
     """`placerec stability`: how many frames of the sources get another word by what a camera does to pictures.
 
-    `out`: the picture to draw. `seed`: of the noise. Raises as
-    `find_sequences`, `Dictionary.load` and `plot_stability`.
+    `out`: the picture to draw, PNG, SVG or PDF by suffix. `seed`: of the noise. Raises SourceError and VisionError for
+    what cannot be read, OutputError for a picture that cannot be written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
         dictionary = Dictionary.load(words)

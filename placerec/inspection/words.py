@@ -104,7 +104,7 @@ def look_up(
     progress: Progress | None,
     matrix: Path | str | None = None,
 ) -> tuple[WordTable, list[Sequence]]:
-    """The table of the frames of some sources, and their sequences. Raises as `find_sequences` and `describe`."""
+    """The table of the frames of some sources, and their sequences; SourceError and VisionError for bad sources."""
     sequences = find_sequences(sources, options=source_options)
     return word_table(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary), sequences
 

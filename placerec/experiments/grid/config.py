@@ -177,20 +177,14 @@ def _choice(*names: str) -> Callable[[Any], str]:
     return lambda value: "" if isinstance(value, str) and value in names else f"choose {_listed(names)}"
 
 
-def _whole(value: Any, least: int, most: float) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
+def _whole(least: int, most: int, remedy: str) -> Callable[[Any], str]:
+    # Not isinstance: true and false are whole numbers, too.
+    return lambda value: "" if type(value) is int and least <= value <= most else remedy
 
 
-def _order(value: Any) -> str:
-    return "" if _whole(value, 1, MAX_ORDER) else f"give a whole number from 1 to {MAX_ORDER}"
-
-
-def _size(value: Any) -> str:
-    return "" if _whole(value, 2, 200) else "give a whole number from 2 to 200, the side of the map"
-
-
-def _count(value: Any) -> str:
-    return "" if _whole(value, 1, 1000) else "give how many there are, a whole number from 1; they are 0, 1, 2..."
+_order = _whole(1, MAX_ORDER, f"give a whole number from 1 to {MAX_ORDER}")
+_size = _whole(2, 200, "give a whole number from 2 to 200, the side of the map")
+_count = _whole(1, 1000, "give how many there are, a whole number from 1; they are 0, 1, 2...")
 
 
 def _share(value: Any) -> str:

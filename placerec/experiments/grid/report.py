@@ -53,7 +53,7 @@ def write_reports(results: Results, plan: Config, config: Path, jobs: Sequence[G
 
 
 def _key(config: Path, jobs: Sequence[GridJob], out: Path) -> str:
-    """What all that is written here depends on."""
+    """A digest of all that the report depends on."""
     rows = [content_digest_of_file(out / name, ExperimentError) for name in ("results.csv", "sequences.csv")]
     made_of = [(job.work.kept.name, job.images.folder.name if job.images else "") for job in jobs]
     return key_of("report", rows, made_of, str(config), read_text(config, ExperimentError), str(out), _versions())
