@@ -24,8 +24,7 @@ from placerec.hohmm.explain import EXPLAINED
 from placerec.jobs import Progress
 from placerec.methods.decoders import HOHMM, make_decoder
 from placerec.model import Decoding, load_model
-from placerec.model.decoding import PAPER
-from placerec.model.recognize import token_streams
+from placerec.model.decoding import PAPER, token_streams
 from placerec.words import WordStream
 from placerec.words.folder import is_stream
 

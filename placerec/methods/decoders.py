@@ -15,7 +15,6 @@ from placerec.methods import (
     dubois2011,
     filliat2008,
     guillaume2011,
-    majority,
     mtd,
     naive_bayes,
     pronobis2010,
@@ -25,8 +24,7 @@ from placerec.methods import (
 )
 from placerec.methods.training_set import MakeStepper, TrainingSet, read_training_set
 from placerec.model import Decoding, PlaceModels, load_model, make_recognizer
-from placerec.model.decoding import PAPER, check_online
-from placerec.model.recognize import check_words
+from placerec.model.decoding import PAPER, check_online, check_words
 from placerec.words import Selection
 
 if TYPE_CHECKING:
@@ -48,7 +46,7 @@ class Method:
 HOHMM = "hohmm"
 METHODS: dict[str, Method] = {
     HOHMM: Method(),
-    "majority": Method(fit=majority.fit),
+    "majority": Method(fit=naive_bayes.fit_majority),
     "naive-bayes": Method(fit=naive_bayes.fit),
     "wu2009": Method(emissions=wu2009.fit),
     "dubois2011": Method(emissions=dubois2011.fit),

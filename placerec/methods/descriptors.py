@@ -1,18 +1,16 @@
 """What the systems on descriptors learn from: labelled training frames as points, with their places and sequences."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.hohmm import Transition
-from placerec.hohmm.filter import filter_step
+from placerec.hohmm.filter import filter_step, normalised
 from placerec.hohmm.prediction import predictor
-from placerec.methods.training_set import normalised
+from placerec.lm.logs import LN10
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # A point float64 (k,) in, its belief float64 (C,) out; on-line, so that a belief depends on no later point.
 PointStepFunction = Callable[[Floats], Floats]
 # Begins a sequence.
@@ -30,13 +28,13 @@ class DescriptorTrainingSet:
     """
 
     points: Floats = field(repr=False)
-    truth: NDArray[np.int64] = field(repr=False)
-    sequences: NDArray[np.int64] = field(repr=False)
+    truth: Ints = field(repr=False)
+    sequences: Ints = field(repr=False)
     places: tuple[str, ...]
-    steps: NDArray[np.int64] = field(repr=False)
+    steps: Ints = field(repr=False)
 
 
-def held_out_folds(sequences: NDArray[np.int64]) -> Iterator[Mask]:
+def held_out_folds(sequences: Ints) -> Iterator[Mask]:
     """Which frames to hold out, bool (n,), fold by fold, given the number of each frame's sequence, int64 (n,).
 
     A fold is one sequence, or each tenth one where there are more than ten.
@@ -53,15 +51,15 @@ def held_out_folds(sequences: NDArray[np.int64]) -> Iterator[Mask]:
         yield mask
 
 
-def scattered(part: Floats, columns: NDArray[np.int64], places: int) -> Floats:
+def scattered(part: Floats, columns: Ints, places: int) -> Floats:
     """Log probabilities (n, C) from those of some places' columns; -inf in the others."""
     spread = np.full((len(part), places), -np.inf)
     spread[:, columns] = part
     return spread
 
 
-def filtered(log10_p: Callable[[Floats], Sequence[float]], transition: Transition) -> MakePointStepper:
-    """The project's filter (eq. 1) over points, one transition a frame; `log10_p` of a point in each place."""
+def filtered(log_likelihoods: Callable[[Floats], Floats], transition: Transition) -> MakePointStepper:
+    """The filter of eq. 1 over points, one transition a frame; `log_likelihoods`: natural, (C,) of a point."""
     predict = predictor(transition, 1.0)
     places = len(transition.matrix)
 
@@ -71,7 +69,7 @@ def filtered(log10_p: Callable[[Floats], Sequence[float]], transition: Transitio
         def step(point: Floats) -> Floats:
             nonlocal log_belief
             predicted = predict(log_belief) if log_belief else [-float(np.log(places))] * places
-            log_belief, _ = filter_step(predicted, log10_p(point))
+            log_belief, _ = filter_step(predicted, (log_likelihoods(point) / LN10).tolist())
             return normalised(np.array(log_belief))
 
         return step

@@ -9,8 +9,9 @@ Open in the paper: the first word of a sequence. Here its probability is P(w | c
 
 import numpy as np
 
+from placerec.arrays import Floats, Ints
 from placerec.methods.tables import PairEmissions, count_pairs
-from placerec.methods.training_set import Floats, Ints, TrainingSet, log_word_p
+from placerec.methods.training_set import TrainingSet, log_word_p
 
 
 def fit(training: TrainingSet) -> PairEmissions:

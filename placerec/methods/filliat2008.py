@@ -13,7 +13,8 @@ second. Before the first decision the belief is that of the votes so far.
 
 import numpy as np
 
-from placerec.methods.training_set import Floats, MakeStepper, StepFunction, TrainingSet
+from placerec.arrays import Floats
+from placerec.methods.training_set import MakeStepper, StepFunction, TrainingSet, lead
 
 QUALITY, MOST = 0.5, 10
 
@@ -30,7 +31,7 @@ def fit(training: TrainingSet, *, quality: float = QUALITY, most: int = MOST) ->
         def step(word: int, elapsed: int) -> Floats:
             nonlocal belief, total, words, decided
             total, words = total + votes[word], words + 1
-            done = words == most or margin(total) >= quality
+            done = words == most or relative_lead(total) >= quality
             if (done or not decided) and total.any():
                 belief = total / total.sum()
             if done:
@@ -50,9 +51,6 @@ def word_votes(training: TrainingSet) -> Floats:
     return votes
 
 
-def margin(votes: Floats) -> float:
+def relative_lead(votes: Floats) -> float:
     """(winner - second) / winner; 0 without any vote, 1 without a second place."""
-    if not votes.any():
-        return 0.0
-    second, first = np.partition(np.append(votes, 0.0), -2)[-2:]
-    return float((first - second) / first)
+    return float(lead(np.append(votes, 0.0)) / votes.max()) if votes.any() else 0.0

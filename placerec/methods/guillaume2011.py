@@ -19,8 +19,10 @@ from math import log
 
 import numpy as np
 
+from placerec.arrays import Floats
 from placerec.errors import ModelError
-from placerec.methods.training_set import Floats, MakeStepper, StepFunction, TrainingSet, log_word_p, normalised
+from placerec.hohmm.filter import normalised
+from placerec.methods.training_set import MakeStepper, StepFunction, TrainingSet, log_word_p
 
 THRESHOLD = log(0.99 / 0.01)
 DETECTORS = ("cusum", "recent", "none")

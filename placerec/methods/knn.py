@@ -6,8 +6,9 @@ share of the votes, so that it has few values and is zero in most places. scikit
 
 import numpy as np
 
+from placerec.arrays import Floats
 from placerec.errors import check_optional
-from placerec.methods.descriptors import DescriptorTrainingSet, Floats, MakePointStepper
+from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
 
 NEIGHBOURS = 5
 

@@ -13,8 +13,9 @@ before a visit are not known, as for n-grams.
 
 import numpy as np
 
+from placerec.arrays import Floats, Ints
 from placerec.methods.tables import PairCounts, PairEmissions, before, count_pairs
-from placerec.methods.training_set import Floats, Ints, TrainingSet, log_word_p
+from placerec.methods.training_set import TrainingSet, log_word_p
 
 LAGS = 3
 # EM ends after so many steps, or when a step gives less than this in nats per word.

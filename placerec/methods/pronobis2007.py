@@ -14,14 +14,14 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.methods.descriptors import Floats, held_out_folds
-from placerec.methods.training_set import normalised
+from placerec.arrays import Floats, Ints
+from placerec.hohmm.filter import normalised
+from placerec.methods.descriptors import held_out_folds
+from placerec.methods.training_set import lead
 
 # The thresholds that are tried: the first never asks the second cue, since a lead is between 0 and 1; the last always.
 MARGINS: tuple[float, ...] = (*np.linspace(0, 1, 41).tolist(), 1.1)
-Ints = NDArray[np.int64]
 
 
 class Answer(NamedTuple):
@@ -51,7 +51,7 @@ def cascade(units: Sequence[Ints], truth: Ints, words: Sequence[int], places: in
     def step(unit: int, look_again: Callable[[], int]) -> Answer:
         scores = first[unit]
         belief = normalised(scores)
-        if _lead(belief) >= margin:
+        if lead(belief) >= margin:
             return Answer(belief, False)
         return Answer(normalised(scores + second[look_again()]), True)
 
@@ -64,7 +64,7 @@ def best_margin(units: Sequence[Ints], truth: Ints, sequences: Ints, words: Sequ
     for held in held_out_folds(sequences):
         first, second = (_log_p(its[~held], truth[~held], K, places) for its, K in zip(units, words, strict=True))
         scores = first[units[0][held]]
-        leads = np.array([_lead(normalised(row)) for row in scores])
+        leads = np.array([lead(normalised(row)) for row in scores])
         alone = scores.argmax(axis=1) == truth[held]
         both = (scores + second[units[1][held]]).argmax(axis=1) == truth[held]
         right += [np.where(leads < margin, both, alone).sum() for margin in MARGINS]
@@ -76,8 +76,3 @@ def _log_p(units: Ints, truth: Ints, words: int, places: int) -> Floats:
     counts = np.bincount(units * places + truth, minlength=words * places).reshape(words, places) + 1.0
     logs: Floats = np.log(counts / counts.sum(axis=0))
     return logs
-
-
-def _lead(belief: Floats) -> float:
-    ranked: list[float] = np.sort(belief).tolist()
-    return ranked[-1] - ranked[-2]

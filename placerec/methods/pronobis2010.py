@@ -15,14 +15,16 @@ from math import log
 
 import numpy as np
 
-from placerec.methods.training_set import Floats, MakeStepper, StepFunction, TrainingSet, log_word_p, normalised
+from placerec.arrays import Floats
+from placerec.hohmm.filter import normalised
+from placerec.methods.training_set import MakeStepper, StepFunction, TrainingSet, lead, log_word_p
 
 BIN, BINS = 5, 6
 TWICE = log(2)
 
 
 def fit(training: TrainingSet, *, frames: int = BIN, bins: int = BINS, confidence: float = TWICE) -> MakeStepper:
-    """Belief from the last `bins` bins of so many `frames`, kept while the margin is below `confidence` nats."""
+    """Belief from the last `bins` bins of so many `frames`, kept while the lead is below `confidence` nats."""
     log_p = log_word_p(training).T.copy()
     places = len(training.places)
 
@@ -44,18 +46,10 @@ def fit(training: TrainingSet, *, frames: int = BIN, bins: int = BINS, confidenc
             while kept[0][0] <= now - bins:
                 kept.popleft()
             scores: Floats = sum((total / words for _, total, words in kept), np.zeros(places))
-            if margin(scores) >= confidence:
+            if lead(scores) >= confidence:
                 belief = normalised(scores)
             return belief
 
         return step
 
     return make_stepper
-
-
-def margin(scores: Floats) -> float:
-    """How far the best score is above the second; infinite if there is no other."""
-    if len(scores) == 1:
-        return np.inf
-    second, best = np.partition(scores, -2)[-2:]
-    return float(best - second)

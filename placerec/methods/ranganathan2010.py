@@ -15,7 +15,8 @@ Simplified: one word a frame, where the original has a pyramid of histograms; A 
 
 import numpy as np
 
-from placerec.methods.training_set import Floats, MakeStepper, StepFunction, TrainingSet, log_word_p
+from placerec.arrays import Floats
+from placerec.methods.training_set import MakeStepper, StepFunction, TrainingSet, log_word_p
 
 CONCENTRATION = 50.0
 VISIT = 150

@@ -15,10 +15,11 @@ from math import inf
 
 import numpy as np
 
+from placerec.arrays import Floats
 from placerec.errors import ModelError
 from placerec.hohmm import learned_transition
 from placerec.lm.backoff import unite_models
-from placerec.methods.training_set import Floats, MakeStepper, StepFunction, TrainingSet
+from placerec.methods.training_set import MakeStepper, StepFunction, TrainingSet
 
 
 def fit(training: TrainingSet) -> MakeStepper:

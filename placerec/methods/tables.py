@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from placerec.methods.training_set import Floats, Ints, TrainingSet
+from placerec.arrays import Floats, Ints
+from placerec.methods.training_set import TrainingSet
 
 
 @dataclass(frozen=True)

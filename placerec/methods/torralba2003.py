@@ -15,14 +15,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints, Mask
 from placerec.hohmm import Transition, filter_stream, learned_transition
+from placerec.lm.logs import LN10
 from placerec.methods.descriptors import (
     DescriptorTrainingSet,
-    Floats,
     MakePointStepper,
-    Mask,
     filtered,
     held_out_folds,
     scattered,
@@ -33,7 +32,6 @@ PROTOTYPES = 100
 # make the filter less sure: a remedy for neighbouring frames, which are alike, that sequences of 500 frames ask for.
 WIDTHS: tuple[float, ...] = tuple(2.0 ** (4 - j / 2) for j in range(21))
 _SMALLEST_BELIEF = 1e-15
-LN10 = float(np.log(10))
 
 
 @dataclass(frozen=True)
@@ -41,9 +39,9 @@ class Prototypes:
     """Prototype points float64 (P, k) in the order of their places; `first` and `count` int64 (D,) per place seen."""
 
     points: Floats = field(repr=False)
-    columns: NDArray[np.int64]  # (D,) the columns of the places that have any
-    first: NDArray[np.int64]
-    count: NDArray[np.int64]
+    columns: Ints  # (D,) the columns of the places that have any
+    first: Ints
+    count: Ints
 
 
 def fit(training: DescriptorTrainingSet, *, prototypes: int = PROTOTYPES, seed: int = 0) -> MakePointStepper:
@@ -83,9 +81,7 @@ def best_width(training: DescriptorTrainingSet, prototypes: int, seed: int) -> f
     return widths[int(total.argmax())]
 
 
-def _evidence(
-    distances: Floats, chosen: Prototypes, width: float, transition: Transition, truth: NDArray[np.int64]
-) -> float:
+def _evidence(distances: Floats, chosen: Prototypes, width: float, transition: Transition, truth: Ints) -> float:
     """The sum of the log beliefs in the true places (T,) of frames with squared `distances` (T, P)."""
     log_p = scattered(_log_density(distances, chosen, width), chosen.columns, len(transition.matrix))
     belief = filter_stream(log_p / LN10, transition).belief[np.arange(len(truth)), truth]
@@ -93,13 +89,12 @@ def _evidence(
     return evidence
 
 
-def _density(chosen: Prototypes, width: float, places: int) -> Callable[[Floats], list[float]]:
-    def log10_p(point: Floats) -> list[float]:
-        part = _log_density(_squared(chosen, point)[None], chosen, width)
-        logs: list[float] = (scattered(part, chosen.columns, places)[0] / LN10).tolist()
-        return logs
+def _density(chosen: Prototypes, width: float, places: int) -> Callable[[Floats], Floats]:
+    def log_likelihoods(point: Floats) -> Floats:
+        (logs,) = scattered(_log_density(_squared(chosen, point)[None], chosen, width), chosen.columns, places)
+        return np.asarray(logs)
 
-    return log10_p
+    return log_likelihoods
 
 
 def _squared(chosen: Prototypes, point: Floats) -> Floats:

@@ -4,15 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
 from placerec.lm import BackoffModel
 from placerec.model.folder import PlaceModels
 from placerec.words import Sentences
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 # The word's index in the vocabulary, and the frames since the selected word before (0 for the first), to a belief (C,).
 StepFunction = Callable[[int, int], Floats]
 # What starts a sequence.
@@ -95,8 +93,9 @@ def log_word_p(training: TrainingSet) -> Floats:
     return log_p
 
 
-def normalised(scores: Floats) -> Floats:
-    """The belief (..., C) in proportion to exp(scores)."""
-    belief: Floats = np.exp(scores - scores.max(axis=-1, keepdims=True))
-    belief /= belief.sum(axis=-1, keepdims=True)
-    return belief
+def lead(scores: Floats) -> float:
+    """How far the best score is above the second; infinite if there is no other."""
+    if len(scores) == 1:
+        return np.inf
+    second, best = np.partition(scores, -2)[-2:]
+    return float(best - second)

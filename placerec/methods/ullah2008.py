@@ -12,21 +12,19 @@ have them as likelihoods, with learned transitions; that is not in the paper.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Mask
 from placerec.errors import check_optional
 from placerec.hohmm import fit_calibration, learned_transition
+from placerec.hohmm.filter import normalised
 from placerec.methods.descriptors import (
     DescriptorTrainingSet,
-    Floats,
     MakePointStepper,
     filtered,
     held_out_folds,
     scattered,
 )
-from placerec.methods.training_set import normalised
 
-LN10 = float(np.log(10))
 # The margin of a place that a fold of the training does not have: below any that occurs, and finite.
 _ABSENT = -20.0
 
@@ -47,11 +45,7 @@ def fit_filtered(training: DescriptorTrainingSet, *, seed: int = 0) -> MakePoint
     shares = np.bincount(training.truth, minlength=len(training.places)) / len(training.truth)
     prior = np.log(shares)
 
-    def log10_p(point: Floats) -> list[float]:
-        logs: list[float] = ((scores(point) - prior) / LN10).tolist()
-        return logs
-
-    return filtered(log10_p, learned_transition(training.steps))
+    return filtered(lambda point: scores(point) - prior, learned_transition(training.steps))
 
 
 def _scores(training: DescriptorTrainingSet, seed: int) -> Callable[[Floats], Floats]:
@@ -75,9 +69,7 @@ def margins(points: Floats, weights: Floats, offsets: Floats) -> Floats:
     return reached
 
 
-def _machines(
-    training: DescriptorTrainingSet, among: NDArray[np.bool_], scale: float, seed: int
-) -> tuple[Floats, Floats]:
+def _machines(training: DescriptorTrainingSet, among: Mask, scale: float, seed: int) -> tuple[Floats, Floats]:
     """One machine per place seen: weights (D, k) and offsets (D,)."""
     check_optional("sklearn", "ullah2008")
     from sklearn.svm import LinearSVC

@@ -2,10 +2,9 @@
 
 from placerec.model.calibrate import calibrate
 from placerec.model.corpus import Corpus, read_corpus
-from placerec.model.decoding import Decoding, transition_of
+from placerec.model.decoding import Decoding, load_recognizer, make_recognizer, transition_of
 from placerec.model.folder import PlaceModels, load_model
 from placerec.model.options import ModelOptions, parse_min_count
-from placerec.model.recognize import load_recognizer, make_recognizer
 from placerec.model.train import estimate_place, train_lm, train_model
 from placerec.model.update import update
 

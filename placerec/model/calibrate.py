@@ -6,16 +6,15 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
 from placerec.files import held_folder
 from placerec.hohmm import Beliefs
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.unknown import measure_distances
-from placerec.model.decoding import PAPER, Decoding, describe_decoding
+from placerec.model.decoding import PAPER, Decoding, describe_decoding, make_recognizer, token_streams
 from placerec.model.folder import PlaceModels, load_model
-from placerec.model.recognize import make_recognizer, token_streams
 from placerec.words import WordStream
 from placerec.words.folder import TokenMaker, dictionary_of, stream_files
 
@@ -65,7 +64,7 @@ def _decoded(models: PlaceModels, streams: Sequence[WordStream], options: Decodi
     return [recognizer.decode(stream, smooth=options.smooth, lag=options.lag) for stream in streams]
 
 
-def _judged(models: PlaceModels, decoded: Sequence[Beliefs]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _judged(models: PlaceModels, decoded: Sequence[Beliefs]) -> tuple[Floats, Ints]:
     """The beliefs (n, C) of all frames that are labelled with a place of the model, and its column (n,)."""
     labels = [label for beliefs in decoded for label in beliefs.truth]
     truth = _columns(models, labels)
@@ -81,7 +80,7 @@ def _judged(models: PlaceModels, decoded: Sequence[Beliefs]) -> tuple[NDArray[np
     return np.concatenate([beliefs.belief for beliefs in decoded])[usable], truth[usable]
 
 
-def _columns(models: PlaceModels, labels: Sequence[str]) -> NDArray[np.int64]:
+def _columns(models: PlaceModels, labels: Sequence[str]) -> Ints:
     column = {place: number for number, place in enumerate(models.models)}
     return np.array([column.get(label, -1) for label in labels], dtype=np.int64)
 

@@ -5,13 +5,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placerec.arrays import Ints
 from placerec.errors import ModelError
 from placerec.hohmm.unknown import Histogram, add_histograms, distance_histogram
 from placerec.words import Sentences, WordStream, place_steps, place_triples
 
-Steps = NDArray[np.int64]
 Route = tuple[str, ...]
 
 
@@ -34,9 +33,9 @@ class Record:
 
     sequences: tuple[LearnedSequence, ...] = ()
     dictionary: str | None = None
-    transitions: Steps | None = field(default=None, repr=False)
+    transitions: Ints | None = field(default=None, repr=False)
     distances: Mapping[str, Histogram] | None = field(default=None, repr=False)
-    triples: Steps | None = field(default=None, repr=False)
+    triples: Ints | None = field(default=None, repr=False)
 
     @property
     def places(self) -> list[str]:
@@ -72,7 +71,7 @@ def record_streams(streams: Iterable[tuple[WordStream, Mapping[str, Sentences]]]
     return Record(tuple(learned), dictionary, transitions, {place: distances[place] for place in places}, triples)
 
 
-def _tabulated(counts: Mapping[Route, int], places: Sequence[str], n: int) -> Steps:
+def _tabulated(counts: Mapping[Route, int], places: Sequence[str], n: int) -> Ints:
     """Counts of routes over n places as int64 (C, C) or (C, C, C)."""
     index = {place: i for i, place in enumerate(places)}
     table = np.zeros((len(places),) * n, np.int64)
@@ -118,7 +117,7 @@ def _counted(result: Record, record: Record, other: Record, sign: int) -> Record
     return Record(result.sequences, result.dictionary, transitions, histograms, triples)
 
 
-def _spread(steps: Steps | None, places: Sequence[str], wider: Sequence[str]) -> Steps:
+def _spread(steps: Ints | None, places: Sequence[str], wider: Sequence[str]) -> Ints:
     """Counts (C, C) or (C, C, C) between `places` as counts between `wider` ones, which hold them."""
     assert steps is not None
     spread = np.zeros((len(wider),) * steps.ndim, np.int64)

@@ -4,14 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from placerec.arrays import Floats, Ints
 from placerec.lm import count_ngrams
 from placerec.methods import MakeStepper, TrainingSet, make_training_set
 from placerec.model import ModelOptions, estimate_place
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def training_set_of(

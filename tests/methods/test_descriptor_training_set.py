@@ -3,6 +3,7 @@
 import numpy as np
 
 from placerec.hohmm import filter_stream, fixed_transition
+from placerec.lm.logs import LN10
 from placerec.methods.descriptors import filtered, held_out_folds, scattered
 
 
@@ -37,7 +38,7 @@ def test_the_filter_over_points_is_the_filter_of_streams() -> None:
     rng = np.random.default_rng(0)
     log10_p = rng.normal(size=(50, 4))
     transition = fixed_transition(4, 0.9)
-    make_stepper = filtered(lambda point: log10_p[int(point[0])].tolist(), transition)
+    make_stepper = filtered(lambda point: log10_p[int(point[0])] * LN10, transition)
     for _ in range(2):  # Every sequence starts anew.
         step = make_stepper()
         online = np.array([step(np.array([t])) for t in range(50)])

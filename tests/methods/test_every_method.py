@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.small_world import write_tokens
-from helpers.training_sets import Ints, followed, training_set_of, training_sets
+from helpers.training_sets import followed, training_set_of, training_sets
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from placerec.arrays import Ints
 from placerec.cli.decode import METHODS as NAMED
 from placerec.methods import METHODS, MakeStepper, TrainingSet, decode, load_decoder, make_training_set
 from placerec.model import ModelOptions, train_lm

@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.training_sets import Floats, followed, training_set_of, training_sets
+from helpers.training_sets import followed, training_set_of, training_sets
 from hypothesis import given
 from hypothesis import strategies as st
 
+from placerec.arrays import Floats
 from placerec.errors import ModelError
 from placerec.hohmm import filter_stream, fixed_transition
+from placerec.hohmm.filter import normalised
 from placerec.methods import TrainingSet, guillaume2011
-from placerec.methods.training_set import log_word_p, normalised
+from placerec.methods.training_set import log_word_p
 
 word_numbers = st.lists(st.integers(0, 4), min_size=1, max_size=25)
 # p0 says w0, p1 says w1, ten to one.

@@ -5,10 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from helpers.training_sets import Floats, Ints, followed, training_set_of, training_sets
+from helpers.training_sets import followed, training_set_of, training_sets
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from placerec.arrays import Floats, Ints
 from placerec.methods import TrainingSet, ranganathan2010
 from placerec.methods.training_set import log_word_p
 

@@ -4,10 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
-from helpers.training_sets import Floats, followed, training_set_of, training_sets
+from helpers.training_sets import followed, training_set_of, training_sets
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from placerec.arrays import Floats
 from placerec.errors import ModelError
 from placerec.hohmm import filter_stream, learned_transition
 from placerec.methods import TrainingSet, second_order

@@ -3,7 +3,7 @@
 import numpy as np
 from helpers.training_sets import followed, training_set_of
 
-from placerec.methods import majority, naive_bayes
+from placerec.methods import naive_bayes
 
 # p0 saw w0 w0 w1, p1 saw w1.
 LESSON = training_set_of([[[0, 0], [1]], [[1]]], words=3)
@@ -14,7 +14,7 @@ def test_the_prior_is_that_of_the_words() -> None:
 
 
 def test_majority_never_changes_its_mind() -> None:
-    np.testing.assert_array_equal(followed(majority.fit(LESSON), [1, 1, 2]), np.tile(LESSON.prior, (3, 1)))
+    np.testing.assert_array_equal(followed(naive_bayes.fit_majority(LESSON), [1, 1, 2]), np.tile(LESSON.prior, (3, 1)))
 
 
 def test_naive_bayes() -> None:

@@ -7,8 +7,9 @@ from helpers.training_sets import followed, training_set_of, training_sets
 from hypothesis import given
 from hypothesis import strategies as st
 
+from placerec.hohmm.filter import normalised
 from placerec.methods import TrainingSet, filliat2008, pronobis2010
-from placerec.methods.training_set import log_word_p, normalised
+from placerec.methods.training_set import log_word_p
 
 # p0 says w0, p1 says w1, ten to one.
 TWO = training_set_of([[[0] * 9], [[1] * 9]], words=2)

@@ -15,7 +15,7 @@ from placerec.errors import ModelError, StreamError
 from placerec.hohmm import format_beliefs, read_beliefs
 from placerec.methods import decode, decode_lines
 from placerec.model import Decoding, calibrate, load_model, load_recognizer, train_lm, update
-from placerec.model.recognize import unknown_model_of
+from placerec.model.decoding import unknown_model_of
 from placerec.words import WordStream, read_stream, write_stream
 
 ASKED = Decoding(unknown=True)
