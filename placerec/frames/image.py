@@ -168,6 +168,7 @@ def _plain_png(name: str, data: bytes) -> bytes:
     raise SourceError(f"{name}: PNG is truncated (no IEND); {_REMEDY}")
 
 
+_SILENT = 0  # the least of OpenCV's log levels, which has no name before 4.13
 _lock = threading.Lock()
 _decoding = 0
 _level = 0
@@ -180,11 +181,10 @@ def quiet() -> Iterator[None]:
     The level is one for the process: the first thread to enter keeps it, the last to leave restores it.
     """
     global _decoding, _level
-    from cv2.utils import logging as cv2_log
-
+    log = opencv_log()
     with _lock:
         if _decoding == 0:
-            _level = cv2_log.setLogLevel(cv2_log.LOG_LEVEL_SILENT)
+            _level = log.setLogLevel(_SILENT)
         _decoding += 1
     try:
         yield
@@ -192,4 +192,11 @@ def quiet() -> Iterator[None]:
         with _lock:
             _decoding -= 1
             if _decoding == 0:
-                cv2_log.setLogLevel(_level)
+                log.setLogLevel(_level)
+
+
+def opencv_log() -> Any:
+    """Where OpenCV has `getLogLevel` and `setLogLevel`: a module of their own since 4.13, cv2 itself before."""
+    import cv2
+
+    return getattr(cv2.utils, "logging", cv2)
