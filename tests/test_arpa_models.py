@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from helpers.opencv import same_jpegs
 
 from placerec.lm import SMOOTHINGS
 
@@ -64,6 +65,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@same_jpegs
 @pytest.mark.parametrize("name", FOLDERS)
 def test_the_commands_of_the_readme_make_the_same_bytes(made: Path, name: str) -> None:
     kept = files(MODELS / name)

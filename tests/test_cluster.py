@@ -14,12 +14,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from helpers.local_dask import ENVIRONMENT, LocalDask, local_dask, wait_until
 from helpers.small_world import write_images, write_tokens
+from helpers.typed_commands import done, placerec
 
 from placerec import cluster as room
-from placerec.cli import commands
 from placerec.cluster import check_address, cluster
 from placerec.errors import MissingExtraError, StreamError
 from placerec.jobs import JobError, Numbered, RemoteExecutor, ScatteredMap, scatter
@@ -186,10 +185,9 @@ def test_tokenize(machines: LocalDask, images: Path, tmp_path: Path, monkeypatch
     with dying(machines, after=4) as work:
         tokenize([images], tmp_path / "words.npz", tmp_path / "there", work=work)
     assert contents(tmp_path / "here") == contents(tmp_path / "there")
-    options = ["-w", str(tmp_path / "words.npz"), "-o", str(tmp_path / "command"), "--cluster", machines.have(1)]
+    options = ["-w", tmp_path / "words.npz", "-o", tmp_path / "command", "--cluster", machines.have(1)]
     monkeypatch.chdir(images)  # where the workers are not
-    result = CliRunner().invoke(commands, ["tokenize", "seq1", "seq2", "seq3", *options])
-    assert result.exit_code == 0, result.output
+    result = done("tokenize", "seq1", "seq2", "seq3", *options)
     assert result.stderr.startswith("72 frames described, 0 skipped, 0 of one grey level throughout\n")
     assert contents(tmp_path / "here") == contents(tmp_path / "command")
 
@@ -246,13 +244,12 @@ def _group(leader: int) -> list[int]:
 def test_what_is_no_address_is_an_error_of_usage(address: str, tmp_path: Path) -> None:
     with pytest.raises(JobError, match="is no cluster; give tcp://HOST:PORT of a scheduler, or local:N"):
         check_address(address)
-    result = CliRunner().invoke(commands, ["describe", "x", "-o", str(tmp_path / "d.npz"), "--cluster", address])
+    result = placerec("describe", "x", "-o", tmp_path / "d.npz", "--cluster", address)
     assert (result.exit_code, "is no cluster; give tcp://" in result.stderr) == (2, True)
 
 
 def test_either_processes_here_or_a_cluster() -> None:
-    both = ["--jobs", "2", "--cluster", "local:2"]
-    result = CliRunner().invoke(commands, ["describe", "x", "-o", "d.npz", *both])
+    result = placerec("describe", "x", "-o", "d.npz", "--jobs", 2, "--cluster", "local:2")
     assert (result.exit_code, "leave one of them out" in result.stderr) == (2, True)
 
 

@@ -8,18 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from helpers.typed_commands import done
 
-from placerec.cli import commands
 from placerec.hohmm import read_beliefs
 
 PLACES = ["corridor_a", "corridor_b", "corridor_c", "corridor_d"]
 
 
 def placerec(*args: object, stdin: str | None = None) -> str:
-    result = CliRunner().invoke(commands, [str(arg) for arg in args], prog_name="placerec", input=stdin)
-    assert result.exit_code == 0, result.output
-    return result.stdout
+    return done(*args, stdin=stdin).stdout
 
 
 def five_commands(laps: Path, out: Path) -> None:

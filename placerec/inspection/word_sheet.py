@@ -98,7 +98,7 @@ def draw_word_sheet(table: WordTable, images: Mapping[int, Gray], path: Path | s
     maps = max(beside, below)
     height = head + max(0.3 + lattice[1], legend + 0.8 + maps) + MARGIN
     with figure_file(path, width, height) as figure:
-        write_line(figure, 0.42, shorten(title, int(width * 8)), 15)
+        write_line(figure, 0.42, shorten(title, int(width * 7.8)), 15)
         for number, line in enumerate(lines):
             write_line(figure, 0.7 + 0.17 * number, line, 8.5, "0.25")
         _lattice(panel(figure, MARGIN + 0.3, head + 0.2, *lattice), table, pictures, tiles)

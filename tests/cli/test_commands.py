@@ -102,7 +102,7 @@ def test_no_command_is_an_error_of_usage() -> None:
 
 def test_unknown_commands_and_options_are_errors_of_usage() -> None:
     misused("No such command 'train'", "train")
-    misused("No such option '--frob'", "decode", "--frob")
+    misused("No such option", "decode", "--frob")
     misused("Missing argument 'SOURCE...'", "train-words")
     misused("Missing option '-m' / '--model'", "decode", "tokens")
     misused("Missing option '-o' / '--out'", "train-lm", "tokens")

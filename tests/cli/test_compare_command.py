@@ -3,10 +3,8 @@
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from helpers.small_world import write_images
-
-from placerec.cli import commands
+from helpers.typed_commands import placerec
 
 pytest.importorskip("matplotlib")
 
@@ -22,7 +20,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_prints_a_table_and_writes_the_folder(runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     arguments = ["compare", runs, "--test", runs / "run2", "--methods", "majority,hohmm", "--size", 2, "-o", out]
-    done = CliRunner().invoke(commands, [*map(str, arguments)])
+    done = placerec(*arguments)
     assert done.exit_code == 0, done.output
     lines = done.stdout.splitlines()
     assert lines[0].split()[:2] == ["method", "accuracy"]
@@ -49,15 +47,13 @@ def test_it_prints_a_table_and_writes_the_folder(runs: Path, tmp_path: Path) -> 
 def test_what_cannot_be_compared_is_one_line(
     runs: Path, tmp_path: Path, arguments: list[str], code: int, words: tuple[str, ...]
 ) -> None:
-    done = CliRunner().invoke(
-        commands, ["compare", str(runs), "--test", str(runs), "-o", str(tmp_path / "out"), *arguments]
-    )
+    done = placerec("compare", runs, "--test", runs, "-o", tmp_path / "out", *arguments)
     assert done.exit_code == code
     assert all(word in done.stderr for word in words), done.stderr
     assert not (tmp_path / "out").exists()
 
 
 def test_a_test_sequence_is_needed(runs: Path, tmp_path: Path) -> None:
-    done = CliRunner().invoke(commands, ["compare", str(runs), "-o", str(tmp_path / "out")])
+    done = placerec("compare", runs, "-o", tmp_path / "out")
     assert done.exit_code == 2
     assert "--test" in done.stderr

@@ -5,16 +5,16 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from helpers.small_world import PLACES, write_tokens
+from helpers.typed_commands import placerec
 
-from placerec.cli import commands
 from placerec.cli.decode import METHODS
 from placerec.model import calibrate, train_lm
 
 
 def decode(*args: object, stdin: str | None = None) -> Result:
-    return CliRunner().invoke(commands, ["decode", *map(str, args)], prog_name="placerec", input=stdin)
+    return placerec("decode", *args, stdin=stdin)
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def test_decisions_are_written_and_read(world: Path, tmp_path: Path) -> None:
     assert [one["best"] for one in reasons] == [one["best"] for one in beliefs]
 
     def inspect(*args: object) -> Result:
-        return CliRunner().invoke(commands, ["inspect", *map(str, args)], prog_name="placerec")
+        return placerec("inspect", *args)
 
     path, page = tmp_path / "b/run3.explain.jsonl", tmp_path / "page.html"
     shown = inspect(path, "12", "-o", page)

@@ -4,16 +4,11 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 from helpers.small_world import write_images
+from helpers.typed_commands import placerec
 
-from placerec.cli import commands
 from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
 from placerec.vision.stability import CHANGES
-
-
-def placerec(*args: object) -> Result:
-    return CliRunner().invoke(commands, [str(arg) for arg in args], prog_name="placerec")
 
 
 @pytest.fixture(scope="module")

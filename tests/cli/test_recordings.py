@@ -1,6 +1,7 @@
 """Videos, bags and lists where images are asked for, as a user types it."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -106,9 +107,14 @@ def test_a_truncated_video_is_told_of_and_read_as_far_as_it_goes(world: Path, tm
     short.unlink()
     count = len(read_stream(tmp_path / "t/short.tsv").words)
     assert 2 < count < 11
-    assert f"warning: {short}: is truncated or damaged: {count + 1} frames up to second 0." in result.stderr
-    assert f"warning: {short}: frame {count:06d} cannot be decoded; the frame is skipped" in result.stderr
-    assert f"{count} frames described, 1 skipped" in result.stderr
+    (listed,) = re.findall(rf"warning: {short}: is truncated or damaged: (\d+) frames up to second 0\.", result.stderr)
+    # The frame that is cut is not listed by every OpenCV.
+    skipped = int(listed) - count
+    assert skipped in (0, 1)
+    assert (
+        result.stderr.count(f"warning: {short}: frame {count:06d} cannot be decoded; the frame is skipped") == skipped
+    )
+    assert f"{count} frames described, {skipped} skipped" in result.stderr
 
 
 def test_words_and_stability_are_shown_of_videos_and_bags(world: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import pytest
 from helpers.ebnf import read_grammars
+from helpers.opencv import same_jpegs
 
 from placerec.experiments.grid.results import COLUMNS
 from placerec.lm import SMOOTHINGS
@@ -61,6 +62,7 @@ def same(shown: str, printed: str) -> bool:
     return kinds[0] == kinds[1] and all(abs(a - b) <= max(5, abs(a) / 5) for a, b in pairs)
 
 
+@same_jpegs
 @pytest.mark.parametrize("name", RUN)
 def test_the_commands_print_what_the_page_shows(ran: dict[str, Ran], name: str) -> None:
     assert CONSOLE.sub("", ran[name].page) == CONSOLE.sub("", ran[name].today)

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from helpers.small_experiment import CONFIG, write_grid
 from helpers.small_world import write_images
+from helpers.typed_commands import done, placerec
 
-from placerec.cli import commands
 from placerec.experiments.grid import Config, Results, experiment, report
 from placerec.experiments.grid.cells import GridJob
 from placerec.experiments.grid.claims import CLAIMS
@@ -39,8 +38,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for seed, name in enumerate("abc"):
         write_images(root / "runs" / name, seed)
     path = write_grid(root, IMAGES)
-    result = CliRunner().invoke(commands, ["experiment", str(path), "-o", str(root / "out"), "--jobs", "1"])
-    assert (result.exit_code, result.stdout) == (0, ""), result.output
+    result = done("experiment", path, "-o", root / "out", "--jobs", 1)
+    assert result.stdout == ""
     assert result.stderr.endswith(f"results.csv: 8 rows; now open {root / 'out' / 'report.html'}\n")
     return root
 
@@ -84,8 +83,7 @@ def test_the_commands_of_the_page_give_the_best_row(world: Path, monkeypatch: py
     assert [line.split()[0] for line in lines] == ["train-words", "tokenize", "train-lm", "decode", "evaluate"]
     monkeypatch.chdir(world)
     for line in lines:
-        result = CliRunner().invoke(commands, [*shlex.split(line), "-q"])
-        assert result.exit_code == 0, result.output
+        done(*shlex.split(line), "-q")
     results = experiment(world / "grid.toml", world / "out")
     best = ranked(results)[0]
     (row,) = [
@@ -133,7 +131,7 @@ def test_a_bar_in_a_cell_does_not_end_it() -> None:
 
 def test_a_mistake_is_one_line_and_status_1(tmp_path: Path) -> None:
     path = write_grid(tmp_path, CONFIG.replace("size = [4]", "size = [1]"))
-    result = CliRunner().invoke(commands, ["experiment", str(path), "-o", str(tmp_path / "out")])
+    result = placerec("experiment", path, "-o", tmp_path / "out")
     assert result.exit_code == 1
     assert result.stderr.startswith(f"placerec: {path}: [grid] size = 1 cannot be used; give a whole number")
     assert result.stderr.count("\n") == 1

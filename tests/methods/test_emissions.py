@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from helpers.small_world import VOCABULARY, write_tokens
 from helpers.training_sets import training_set_of, training_sets
+from helpers.typed_commands import done
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -61,17 +62,12 @@ def test_wu2009_is_one_word_at_a_time(training: TrainingSet) -> None:
 @pytest.mark.parametrize("extra", [(), ("--smooth",), ("--per", "second"), ("--transition", "learned")])
 @pytest.mark.parametrize("delta", [None, 0.3])
 def test_wu2009_is_order_1_to_the_byte(extra: tuple[str, ...], delta: float | None, tmp_path: Path) -> None:
-    from click.testing import CliRunner
-
-    from placerec.cli import commands
-
     tokens = write_tokens(tmp_path / "tokens")
     runs = [tokens / "run1.tsv", tokens / "run2.tsv"]
     train_lm(runs, tmp_path / "model", options=ModelOptions(1, "lidstone-backoff", delta))
-    args = ["decode", str(tokens), "-m", str(tmp_path / "model"), *extra]
+    args = ("decode", tokens, "-m", tmp_path / "model", *extra)
     for out, method in (("a", ()), ("b", ("--method", "wu2009"))):
-        result = CliRunner().invoke(commands, [*args, *method, "-o", str(tmp_path / out)])
-        assert result.exit_code == 0, result.stderr
+        done(*args, *method, "-o", tmp_path / out)
     for name in ("run1.tsv", "run2.tsv", "run3.tsv"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 

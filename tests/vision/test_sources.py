@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from helpers.small_world import write_images
+from helpers.typed_commands import done
 
-from placerec.cli import commands
 from placerec.errors import OutputError
 from placerec.frames import files_of, find_sequences
 from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, describe_sources, train_dictionary
@@ -49,8 +48,7 @@ def test_the_command_says_what_came_of_it(tmp_path: Path) -> None:
     out = tmp_path / "words.npz"
     options = ["--size", "3", "--image-size", "32", "--rule", "online", "--width", "0.4", "--epochs", "4"]
     held_out = ["--held-out", str(tmp_path / "run1"), "--held-out", str(write_images(tmp_path / "run2"))]
-    result = CliRunner().invoke(commands, ["train-words", str(tmp_path / "run1"), "-o", str(out), *options, *held_out])
-    assert result.exit_code == 0, result.output
+    result = done("train-words", tmp_path / "run1", "-o", out, *options, *held_out)
     made = Dictionary.load(out)
     assert (made.training.rule, made.training.width, made.quality.epochs) == ("online", 0.4, 4)
     assert made.spec == SPEC
