@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tarfile
 import tomllib
 import zipfile
@@ -13,6 +14,7 @@ from email.message import Message
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import minimal
 import pytest
 
 from placerec.version import __version__
@@ -171,3 +173,35 @@ def test_the_page_on_installing_names_every_extra() -> None:
         for requirement in extras[name]:
             assert re.split(r"[\[>]", requirement)[0].split("-")[-1].lower() in row.lower(), name
     assert PROJECT["project"]["requires-python"].removeprefix(">=") in page
+
+
+def test_the_oldest_packages_are_those_of_the_lower_bounds() -> None:
+    lines = minimal.constraints()
+    assert {re.split("[=<]", line)[0] for line in lines} >= {requirement.name for requirement in minimal.requirements()}
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    bounds = [line.split("==") for line in lines if line not in minimal.NEWEST]
+    assert len(bounds) > 15
+    assert [line for line in bounds if not re.search(rf'"{line[0]}(\[\w+\])?>={re.escape(line[1])}["; ]', text)] == []
+
+
+def test_an_editable_install_is_a_path_that_type_checkers_follow(tmp_path: Path) -> None:
+    """Not a hook, which gives way to a folder of the package's name, as a clone has it for those who stand above it."""
+    clone = tmp_path / "placerec"
+    clone.mkdir()
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, clone)
+    for name in ("placerec", "bin"):
+        shutil.copytree(ROOT / name, clone / name)
+    backend("build_editable", clone, tmp_path)
+    with zipfile.ZipFile(tmp_path / f"placerec-{__version__}-0.editable-py3-none-any.whl") as wheel:
+        wheel.extractall(tmp_path / "site")
+    (path,) = filter(Path.is_file, (tmp_path / "site").iterdir())
+    assert path.suffix == ".pth"
+    assert path.read_text("utf-8").splitlines() == [str(clone)]
+    # Without this environment's own site, which has the real clone.
+    code = (
+        f"import sys, site; sys.path.append({sysconfig.get_path('purelib')!r}); site.addsitedir({str(path.parent)!r})\n"
+        "import placerec; print(placerec.__file__, placerec.gist.__module__)"
+    )
+    done = subprocess.run([sys.executable, "-S", "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == (f"{clone / 'placerec/__init__.py'} placerec.vision.gist\n", "")
