@@ -15,8 +15,8 @@ _ROOMS = {
     "placerec.words": ("Selection", "WordStream", "parse_selection", "read_stream", "select", "write_stream"),
     "placerec.words.tokenize": ("tokenize",),
     "placerec.lm": ("BackoffModel", "count_ngrams", "estimate", "read_arpa", "smoothing", "write_arpa"),
-    "placerec.lm.checks": ("check_model",),
-    "placerec.lm.inspection": ("inspect_model",),
+    "placerec.lm.check": ("check_model",),
+    "placerec.lm.inspect": ("inspect_model",),
     "placerec.hohmm": (
         "Belief",
         "Beliefs",
@@ -60,8 +60,8 @@ if TYPE_CHECKING:
     from placerec.inspection import inspect_decision, show_frame, show_words, stability
     from placerec.lab import render_lab
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
-    from placerec.lm.checks import check_model
-    from placerec.lm.inspection import inspect_model
+    from placerec.lm.check import check_model
+    from placerec.lm.inspect import inspect_model
     from placerec.methods import decode, follow_live, load_decoder
     from placerec.model import Decoding, ModelOptions, calibrate, load_recognizer, train_lm, update
     from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary

@@ -21,7 +21,7 @@ from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import WordTable, typical_images, word_sentences, word_table
 from placerec.jobs import ProgressBar
 from placerec.lab import render_lab
-from placerec.lm.inspection import format_inspection, inspect_model
+from placerec.lm.inspect import format_inspection, inspect_model
 from placerec.model import ModelOptions, load_recognizer, read_corpus, train_model
 from placerec.vision import Dictionary, DictionaryOptions, describe
 from placerec.words import read_stream

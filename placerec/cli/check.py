@@ -20,7 +20,7 @@ def check(models: tuple[Path, ...], as_json: bool) -> None:
     """
     import json
 
-    from placerec.lm.checks import check_model
+    from placerec.lm.check import check_model
 
     checks = []
     for path in models:

@@ -52,7 +52,7 @@ def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[obj
 
 
 def _model(path: Path, asked: tuple[str, ...], top: int) -> tuple[object, str]:
-    from placerec.lm.inspection import format_inspection, inspect_model
+    from placerec.lm.inspect import format_inspection, inspect_model
 
     inspection = inspect_model(path, asked, top=top)
     return inspection, format_inspection(inspection)

@@ -26,7 +26,7 @@ from placerec.hohmm.prediction import CHUNK, predicted_beliefs, transition_steps
 from placerec.hohmm.transitions import Transition
 from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
-from placerec.lm.inspection import explain as explain_word
+from placerec.lm.inspect import explain as explain_word
 from placerec.words import WordStream
 
 # A decision as plain data: a line of NAME.explain.jsonl (docs/files.md).

@@ -40,12 +40,12 @@ def format_arpa(model: BackoffModel, comment: str = "") -> str:
 def arpa_blocks(model: BackoffModel, comment: str = "", *, encoding: str = "utf-8") -> Iterator[bytes]:
     """The same text in blocks of encoded lines, so that it need not be held whole."""
     weighted = [~np.isnan(backoff) for backoff in model.backoffs]
-    return row_blocks(model.trie, model.log10_ps, model.backoffs, weighted, comment=comment, encoding=encoding)
+    return row_blocks(model.trie, model.log10_probs, model.backoffs, weighted, comment=comment, encoding=encoding)
 
 
 def row_blocks(
     trie: Trie,
-    log10_ps: Sequence[Singles],
+    log10_probs: Sequence[Singles],
     backoffs: Sequence[Singles],
     weighted: Sequence[Mask],
     *,
@@ -72,7 +72,7 @@ def row_blocks(
         word = word[rows]
         shown = slice(None) if stored is None else np.flatnonzero(stored[n - 1][rows])
         its = rows[shown]
-        log10_p, backoff, has_weight = log10_ps[n - 1][its], backoffs[n - 1][its], weighted[n - 1][its]
+        log10_p, backoff, has_weight = log10_probs[n - 1][its], backoffs[n - 1][its], weighted[n - 1][its]
         yield from lines.blocks(log10_p, backoff, has_weight, before[shown], word[shown])
         if n < trie.order:
             by_word = np.argsort(_narrow(word, len(words)), kind="stable")
@@ -104,6 +104,19 @@ def write_arpa(model: BackoffModel, path: Path | str, *, comment: str = "") -> N
     write_text(Path(path), format_arpa(model, comment))
 
 
+def as_printed(model: BackoffModel) -> BackoffModel:
+    """The model as it comes back from an ARPA file, where numbers have seven significant digits."""
+    log10_probs, backoffs = (tuple(map(_seven_digits, values)) for values in (model.log10_probs, model.backoffs))
+    return BackoffModel(model.trie, log10_probs, backoffs)
+
+
+def _seven_digits(values: Singles) -> Singles:
+    exact = values.astype(np.float64)
+    rounded = np.isfinite(exact) & (exact != 0)
+    unit = 10.0 ** (6 - np.floor(np.log10(np.abs(exact, where=rounded, out=np.ones_like(exact)))))
+    return np.where(rounded, np.rint(exact * unit) / unit, exact).astype(np.float32)
+
+
 def with_unigrams(model: BackoffModel, words: Sequence[str]) -> BackoffModel:
     """`model` with those of `words` that it does not list added with probability zero and no backoff weight.
 
@@ -119,11 +132,11 @@ def with_unigrams(model: BackoffModel, words: Sequence[str]) -> BackoffModel:
         new_row = np.arange(len(keys[-1]))
     log10_p = np.full(len(vocabulary), -np.inf, np.float32)
     backoff = np.full(len(vocabulary), np.nan, np.float32)
-    log10_p[new_word], backoff[new_word] = model.log10_ps[0], model.backoffs[0]
+    log10_p[new_word], backoff[new_word] = model.log10_probs[0], model.backoffs[0]
     return replace(
         model,
         trie=Trie(vocabulary, tuple(keys)),
-        log10_ps=(log10_p, *model.log10_ps[1:]),
+        log10_probs=(log10_p, *model.log10_probs[1:]),
         backoffs=(backoff, *model.backoffs[1:]),
     )
 
@@ -262,11 +275,11 @@ class _Reader:
             raise self.error("the context of an n-gram is missing at two orders", line)
         trie = model.trie
         log10_p = np.array([model.tables.score(ngram)[-1] for ngram in numbers], np.float32)
-        shorter = BackoffModel(Trie(trie.vocabulary, trie.keys[:-1]), model.log10_ps[:-1], model.backoffs[:-1])
+        shorter = BackoffModel(Trie(trie.vocabulary, trie.keys[:-1]), model.log10_probs[:-1], model.backoffs[:-1])
         return _with_order(
             shorter,
             np.concatenate([trie.keys[-1], prefix * len(trie.vocabulary) + numbers[:, -1]]),
-            np.concatenate([model.log10_ps[-1], log10_p]),
+            np.concatenate([model.log10_probs[-1], log10_p]),
             np.concatenate([model.backoffs[-1], np.full(len(log10_p), np.nan, np.float32)]),
         )
 
@@ -308,6 +321,6 @@ def _with_order(model: BackoffModel, key: Ints, log10_p: Singles, backoff: Singl
     distinct, rows = np.unique(key, return_index=True)
     return BackoffModel(
         Trie(model.trie.vocabulary, (*model.trie.keys, distinct)),
-        (*model.log10_ps, log10_p[rows]),
+        (*model.log10_probs, log10_p[rows]),
         (*model.backoffs, backoff[rows]),
     )

@@ -1,8 +1,9 @@
 """Back-off models: a log10 probability for each listed n-gram, a backoff weight for each listed context."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,17 +11,20 @@ from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.score import Ngrams, ScoreTables, build_tables
 from placerec.lm.trie import Trie, Vocabulary, runs
 
+if TYPE_CHECKING:
+    from placerec.lm.perplexity import Totals
+
 
 @dataclass(frozen=True)
 class BackoffModel:
     """An n-gram model as an ARPA file holds it.
 
-    `log10_ps[n-1]` float32 (m_n,) beside the rows of `trie` (-inf for probability zero); `backoffs[n-1]` float32
+    `log10_probs[n-1]` float32 (m_n,) beside the rows of `trie` (-inf for probability zero); `backoffs[n-1]` float32
     (m_n,) log10 weights, nan where the n-gram is not listed as a context.
     """
 
     trie: Trie
-    log10_ps: tuple[Singles, ...] = field(repr=False)
+    log10_probs: tuple[Singles, ...] = field(repr=False)
     backoffs: tuple[Singles, ...] = field(repr=False)
 
     @property
@@ -50,6 +54,17 @@ class BackoffModel:
         """
         return self.tables.score(self.ids(words))
 
+    def perplexity(self, sentences: Iterable[Sequence[str]]) -> "Totals":
+        """What the model makes of sentences of words: `sentences, words, oovs, zeroprobs, log10_p, ppl, ppl1`.
+
+        Counted as `ngram -ppl` does: each sentence between <s> and </s>, no context spans two; words without
+        probability are counted (`oovs`: unknown, `zeroprobs`: known), and neither in `log10_p` nor in `ppl`, which
+        counts words and sentence ends (`ppl1`: words alone; None where there are none).
+        """
+        from placerec.lm.perplexity import measure
+
+        return measure(self, sentences)
+
     def ids(self, words: Sequence[str]) -> Ints:
         """Word numbers int64 (T,); `<unk>`'s, or -1 if it is not listed, for words that are not listed."""
         ids = self.trie.vocabulary.ids(words)
@@ -59,7 +74,7 @@ class BackoffModel:
     @cached_property
     def tables(self) -> ScoreTables:
         """The tables that give words their probability."""
-        columns = zip(self.log10_ps, map(float_weights, self.backoffs), self.backoffs, strict=True)
+        columns = zip(self.log10_probs, map(float_weights, self.backoffs), self.backoffs, strict=True)
         orders = [
             [Ngrams(self.trie.matrix(n), log10_p.astype(np.float64), weight, ~np.isnan(backoff))]
             for n, (log10_p, weight, backoff) in enumerate(columns, start=1)
@@ -138,6 +153,6 @@ def _columns(trie: Trie, models: Sequence[BackoffModel]) -> tuple[list[Floats], 
         for n in range(1, model.order + 1):
             if n > 1:
                 row = trie.find(n, row[model.trie.prefix(n)], word[model.trie.word(n)])
-            log10_p[n - 1][row, c] = model.log10_ps[n - 1]
+            log10_p[n - 1][row, c] = model.log10_probs[n - 1]
             weights[n - 1][row, c] = float_weights(model.backoffs[n - 1])
     return log10_p, weights

@@ -14,15 +14,15 @@ from placerec.lm.logs import EPSILON
 from placerec.lm.trie import per_context
 
 
-def counts_of_counts(counts: NgramCounts, n: int, top: int, event: Mask, meta: Ints) -> Ints:
+def counts_of_counts(counts: NgramCounts, n: int, top: int, predictable: Mask, meta: Ints) -> Ints:
     """How many n-grams of order n occur 0, 1, ..., `top` times, int64 (top+1,).
 
-    `event` bool (V,): words whose n-grams count when they come last. `meta` int64 (V,): k > 0 for a word that stands
-    for "n-grams that occur k times", as often as its count says.
+    `predictable` bool (V,): words whose n-grams count when they come last. `meta` int64 (V,): k > 0 for a word that
+    stands for "n-grams that occur k times", as often as its count says.
     """
     trie = counts.trie
     word, count, seen = trie.word(n), counts.counts[n - 1], counts.seen[n - 1]
-    plain = count[seen & event[word] & (count <= top)].astype(np.int64)
+    plain = count[seen & predictable[word] & (count <= top)].astype(np.int64)
     tally = np.bincount(plain, minlength=top + 1)
     said = seen & (meta[word] > 0) & (meta[word] <= top)
     np.add.at(tally, meta[word[said]], count[said].astype(np.int64))
@@ -60,10 +60,10 @@ def good_turing_factors(tally: Ints, top: int) -> tuple[list[float] | None, list
     return factors, warnings
 
 
-def left_neighbour_counts(counts: NgramCounts, n: int, event: Mask) -> NgramCounts:
+def left_neighbour_counts(counts: NgramCounts, n: int, predictable: Mask) -> NgramCounts:
     """The counts with those of order n replaced by numbers of distinct words to the left (Kneser & Ney 1995).
 
-    N-grams whose first word is no event (<s>) keep their counts. Order n+1 must still hold plain counts.
+    N-grams whose first word is not predictable (<s>) keep their counts. Order n+1 must still hold plain counts.
     """
     trie = counts.trie
     own = counts.counts[n - 1]
@@ -75,9 +75,9 @@ def left_neighbour_counts(counts: NgramCounts, n: int, event: Mask) -> NgramCoun
     for k in range(n + 1, 2, -1):
         second = trie.prefix(k)[second]
     # `second` is the row of the first two words; its last word is the second word.
-    rows = trie.suffixes[n][longer & event[trie.word(2)[second]]]
+    rows = trie.suffixes[n][longer & predictable[trie.word(2)[second]]]
     neighbours = np.bincount(rows, minlength=len(own)).astype(own.dtype)
-    modified = np.where(event[first], 0, own) + np.where(counts.seen[n - 1], neighbours, 0)
+    modified = np.where(predictable[first], 0, own) + np.where(counts.seen[n - 1], neighbours, 0)
     return replace(counts, counts=(*counts.counts[: n - 1], modified, *counts.counts[n:]))
 
 

@@ -10,9 +10,9 @@ from placerec.errors import LanguageModelError
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import Context, Rule
-from placerec.lm.draft import Draft, insert_prefixes, weigh_contexts
 from placerec.lm.logs import EPSILON, log10, p_of
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.mutable import MutableModel, insert_prefixes, weigh_contexts
 from placerec.lm.smoothings import Smoothing
 from placerec.lm.trace import SILENT, Trace
 from placerec.lm.trie import Trie, per_context, runs
@@ -40,14 +40,14 @@ def estimate(
     for n in range(1, counts.order + 1):
         counts, discount = smoothing.fit(counts, n, ~vocabulary.mask(silent))
         rules.append(Rule(discount, smoothing.interpolate, min_count[min(n, len(min_count)) - 1]))
-    draft = estimate_draft(counts, rules, non_events=non_events, open_vocabulary=open_vocabulary)
-    if not draft.event.any():
+    model = estimate_mutable(counts, rules, non_events=non_events, open_vocabulary=open_vocabulary)
+    if not model.predictable.any():
         raise LanguageModelError("the vocabulary holds no word that could be predicted; is the vocabulary file empty?")
-    insert_prefixes(draft, SILENT)
-    return draft.model()
+    insert_prefixes(model, SILENT)
+    return model.model()
 
 
-def estimate_draft(
+def estimate_mutable(
     counts: NgramCounts,
     rules: Sequence[Rule],
     *,
@@ -56,31 +56,33 @@ def estimate_draft(
     unknown: str = UNKNOWN,
     meta_tag: str | None = None,
     trust_totals: bool = False,
-    names: Ints | None = None,
+    alias_counts: Ints | None = None,
     trace: Trace = SILENT,
-) -> Draft:
+) -> MutableModel:
     """The model of `counts` by one rule per order, before missing prefixes are inserted.
 
     `unknown`: the word that stands for those outside the vocabulary.
     `meta_tag`: words that start with it are counts of counts (section 4.5 of our SRILM specification).
-    `trust_totals`: a context's own count is its total. `names` int64 (V,): how many names each word has.
+    `trust_totals`: a context's own count is its total. `alias_counts` int64 (V,): how many names each word has.
     """
     trie = counts.trie
     meta = _MetaCounts.of(trie, meta_tag)
     silent = {*non_events, SENTENCE_START} | (set() if open_vocabulary else {unknown})
-    event = ~trie.vocabulary.mask(silent) & ~meta.word
-    draft = Draft(trie, event, np.ones(len(event), np.int64) if names is None else names)
+    predictable = ~trie.vocabulary.mask(silent) & ~meta.word
+    model = MutableModel(
+        trie, predictable, np.ones(len(predictable), np.int64) if alias_counts is None else alias_counts
+    )
     # <s> is listed always, other non-events where the counts hold them; <unk> never while it is one.
-    listed = ~event & ~meta.word & counts.seen[0] & ~trie.vocabulary.mask([unknown])
-    draft.stored[0] |= listed | trie.vocabulary.mask([SENTENCE_START])
+    listed = ~predictable & ~meta.word & counts.seen[0] & ~trie.vocabulary.mask([unknown])
+    model.stored[0] |= listed | trie.vocabulary.mask([SENTENCE_START])
     closed = _closed_contexts(trie, None if open_vocabulary else unknown)
     for n, rule in enumerate(rules, start=1):
         trace.discarded_contexts(n, int((closed[n - 1] & _seen(counts, n - 1)).sum()))
-        _estimate_order(draft, counts, n, rule, closed[n - 1], meta, trust_totals, trace)
+        _estimate_order(model, counts, n, rule, closed[n - 1], meta, trust_totals, trace)
         trace.order_done(n)
-        weigh_contexts(draft, n, trace)
-        draft.refresh(n)
-    return draft
+        weigh_contexts(model, n, trace)
+        model.refresh(n)
+    return model
 
 
 # SRILM adds 1 to a context's count until 3 in a million is left: a million steps do for counts of 3e11.
@@ -122,7 +124,7 @@ def _closed_contexts(trie: Trie, closed_word: str | None) -> list[Mask]:
 
 
 def _estimate_order(
-    draft: Draft,
+    model: MutableModel,
     counts: NgramCounts,
     n: int,
     rule: Rule,
@@ -132,35 +134,35 @@ def _estimate_order(
     trace: Trace,
 ) -> None:
     """Sections 6.2 to 6.4: the probabilities of order n."""
-    trie = draft.trie
+    trie = model.trie
     prefix = trie.prefix(n) if n > 1 else np.zeros(len(trie.keys[0]), np.int64)
     rows = np.flatnonzero(counts.seen[n - 1] & ~closed[prefix])
     word = trie.word(n)[rows]
     contexts, group = runs(prefix[rows])
-    stats = _statistics(counts, n, rows, group, len(contexts), draft.event[word], meta, word)
+    stats = _statistics(counts, n, rows, group, len(contexts), model.predictable[word], meta, word)
     if trust_totals and n > 1:
         stats = Context(counts.counts[n - 2][contexts].astype(np.float64), stats.types, stats.types2, stats.types3)
     alive = stats.total[group] > 0
     count = counts.counts[n - 1][rows].astype(np.float64)
     if n > 1:
         alive &= (count != 0) & ~meta.word[word]
-        trace.discarded_ngrams(n, int((alive & ~draft.event[word]).sum()), 0)
-    kept = alive & draft.event[word]
-    lower = _lower(draft, n, rows[kept])
-    size = int(draft.event.sum() + meta.word.sum())
-    _fill_order(draft, _Order(n, rule, size, rows[kept], group[kept], count[kept], lower, contexts, stats), trace)
+        trace.discarded_ngrams(n, int((alive & ~model.predictable[word]).sum()), 0)
+    kept = alive & model.predictable[word]
+    lower = _lower(model, n, rows[kept])
+    size = int(model.predictable.sum() + meta.word.sum())
+    _fill_order(model, _Order(n, rule, size, rows[kept], group[kept], count[kept], lower, contexts, stats), trace)
 
 
-def _lower(draft: Draft, n: int, rows: Ints) -> Singles:
+def _lower(model: MutableModel, n: int, rows: Ints) -> Singles:
     """log10 p float32 (m,) of n-grams by the shorter context, the uniform one at the end."""
     if n == 1:
-        return np.full(len(rows), np.float32(-np.log10(max(1, int(draft.event.sum())))), np.float32)
-    draft.refresh(n - 1)
-    return draft.backed_off(n - 1)[draft.trie.suffixes[n - 1][rows]]
+        return np.full(len(rows), np.float32(-np.log10(max(1, int(model.predictable.sum())))), np.float32)
+    model.refresh(n - 1)
+    return model.backed_off(n - 1)[model.trie.suffixes[n - 1][rows]]
 
 
 def _statistics(
-    counts: NgramCounts, n: int, rows: Ints, group: Ints, size: int, event: Mask, meta: _MetaCounts, word: Ints
+    counts: NgramCounts, n: int, rows: Ints, group: Ints, size: int, predictable: Mask, meta: _MetaCounts, word: Ints
 ) -> Context:
     """Section 6.2, per context (size,): totals and types over the words that are events, and what meta counts add."""
     count = counts.counts[n - 1][rows].astype(np.float64)
@@ -168,10 +170,10 @@ def _statistics(
     tag = meta.word[word] & (n > 1)
     total_tag, type_tag = tag & (times == 0), tag & (times > 0)
     return Context(
-        total=per_context(group, size, np.where(type_tag, times * count, np.where(event | total_tag, count, 0))),
-        types=per_context(group, size, np.where(type_tag, count, (event | total_tag).astype(np.float64))),
-        types2=per_context(group, size, np.where(type_tag, count * (times >= 2), event & (count >= 2))),
-        types3=per_context(group, size, np.where(type_tag, count * (times >= 3), event & (count >= 3))),
+        total=per_context(group, size, np.where(type_tag, times * count, np.where(predictable | total_tag, count, 0))),
+        types=per_context(group, size, np.where(type_tag, count, (predictable | total_tag).astype(np.float64))),
+        types2=per_context(group, size, np.where(type_tag, count * (times >= 2), predictable & (count >= 2))),
+        types3=per_context(group, size, np.where(type_tag, count * (times >= 3), predictable & (count >= 3))),
     )
 
 
@@ -193,12 +195,12 @@ class _Order:
     stats: Context
 
 
-def _fill_order(draft: Draft, order: _Order, trace: Trace) -> None:
+def _fill_order(model: MutableModel, order: _Order, trace: Trace) -> None:
     """Sections 6.3 and 6.4: store p of the n-grams of `order`."""
     rule, n, group = order.rule, order.n, order.group
     interpolate = np.full(len(order.contexts), rule.interpolate and rule.discount is not None)
     total = order.stats.total
-    roomy = (order.stats.types < int(draft.event.sum())) & rule.exhaustible & (rule.discount is not None)
+    roomy = (order.stats.types < int(model.predictable.sum())) & rule.exhaustible & (rule.discount is not None)
     p = np.zeros(len(order.rows))
     kept = np.zeros(len(order.rows), bool)
     todo = np.ones(len(order.contexts), bool)
@@ -218,10 +220,10 @@ def _fill_order(draft: Draft, order: _Order, trace: Trace) -> None:
         attempt += 1
         _check_reachable(n, total[todo], spent[todo])
     stored = order.rows[kept]
-    draft.log10_p[n - 1][stored] = log10(p[kept])
-    draft.stored[n - 1][stored] = True
+    model.log10_p[n - 1][stored] = log10(p[kept])
+    model.stored[n - 1][stored] = True
     if n > 1:
-        draft.add_nodes(n - 1, runs(draft.trie.prefix(n)[stored])[0])
+        model.add_contexts(n - 1, runs(model.trie.prefix(n)[stored])[0])
 
 
 def _check_reachable(n: int, total: Floats, spent: Floats) -> None:

@@ -1,37 +1,17 @@
-"""One model from several: static interpolation, and the values of one model in the shape of another.
+"""Several models as one: merged into a back-off model, or mixed while a text is scored.
 
-Sections 11.4 and 11.6 of our SRILM specification.
+Sections 11.4 to 11.6 of our SRILM specification. Where components are mixed their probabilities are given as log10,
+float32, stacked: (K, T) for K models and T words.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from placerec.arrays import Singles
-from placerec.errors import LanguageModelError
-from placerec.lm.backoff import BackoffModel
-from placerec.lm.draft import Draft, drafts_of, reweigh
-from placerec.lm.logs import log10, p_of
-from placerec.lm.markers import SENTENCE_START, UNKNOWN
+from placerec.arrays import Floats, Ints, Mask, Singles
+from placerec.lm.logs import LN10, log10, p_of
+from placerec.lm.mutable import MutableModel, reweigh
 from placerec.lm.trace import SILENT, Trace
-
-
-def interpolate(
-    models: Sequence[BackoffModel], weights: Sequence[float], *, non_events: Iterable[str] = (SENTENCE_START, UNKNOWN)
-) -> BackoffModel:
-    """The back-off model that stands for the weighted mean of `models`.
-
-    It lists the n-grams of all of them, each with the mean of their probabilities; backoff weights are recomputed.
-    Raises LanguageModelError unless there is one weight >= 0 per model and they sum to 1.
-    """
-    if len(models) != len(weights) or not models:
-        raise LanguageModelError(f"{len(weights)} weights for {len(models)} models; give one per model")
-    if min(weights) < 0 or abs(sum(weights) - 1) > 1e-6:
-        raise LanguageModelError(f"the weights {tuple(weights)} must be 0 or more and sum to 1")
-    draft, *others = drafts_of(models, list(non_events))
-    for k, other in enumerate(others, start=1):
-        merge(draft, other, merge_weight(weights, k))
-    return draft.model()
 
 
 def merge_weight(weights: Sequence[float], k: int) -> float:
@@ -40,20 +20,91 @@ def merge_weight(weights: Sequence[float], k: int) -> float:
     return 1 - weights[k] / total if weights[k] and total else 1.0
 
 
-def merge(draft: Draft, other: Draft, weight: float, trace: Trace = SILENT) -> None:
-    """Section 11.4: mix `other`, over the same trie, into `draft`, whose share is `weight`."""
+def merge(model: MutableModel, other: MutableModel, weight: float, trace: Trace = SILENT) -> None:
+    """Section 11.4: mix `other`, over the same trie, into `model`, whose share is `weight`."""
     mixed: list[Singles] = []
-    for n in range(1, draft.order + 1):
-        mixed.append(_mix(draft.backed_off(n), other.backed_off(n), weight))
-    for n in range(draft.order, 0, -1):
-        new = np.flatnonzero(other.stored[n - 1] & ~draft.stored[n - 1])
-        draft.stored[n - 1][new] = True
+    for n in range(1, model.order + 1):
+        mixed.append(_mix(model.backed_off(n), other.backed_off(n), weight))
+    for n in range(model.order, 0, -1):
+        new = np.flatnonzero(other.stored[n - 1] & ~model.stored[n - 1])
+        model.stored[n - 1][new] = True
         if n > 1:
-            draft.add_nodes(n - 1, np.unique(draft.trie.prefix(n)[new]))
-        stored = draft.stored[n - 1]
-        draft.log10_p[n - 1][stored] = mixed[n - 1][stored]
-    reweigh(draft, trace)
+            model.add_contexts(n - 1, np.unique(model.trie.prefix(n)[new]))
+        stored = model.stored[n - 1]
+        model.log10_p[n - 1][stored] = mixed[n - 1][stored]
+    reweigh(model, trace)
 
 
 def _mix(a: Singles, b: Singles, weight: float) -> Singles:
     return log10(weight * p_of(a) + (1 - weight) * p_of(b))
+
+
+def mixed(log10_probs: Singles, weights: Floats) -> Singles:
+    """log10 of the mean probability, float32 (T,); `weights` (K,), or (K, T) for each word, need not sum to 1."""
+    weights = weights[:, None] if weights.ndim == 1 else weights
+    total = np.zeros(log10_probs.shape[1])
+    for log10_p, weight in zip(log10_probs, weights, strict=True):
+        total += weight * p_of(log10_p)
+    return log10(total / _sum(weights))
+
+
+def posteriors(weights: Sequence[float], joints: Singles, scale: float) -> Floats:
+    """The weights (K, T) after the models have been seen to give the recent words log10 p `joints` (K, T).
+
+    Each weight is multiplied by 10^(scale * joint), and they sum to 1; where all vanish they are the plain ones.
+    """
+    plain = np.array(weights, np.float64)[:, None]
+    with np.errstate(invalid="ignore"):
+        seen = plain * np.exp((scale * joints.astype(np.float64)).astype(np.float32).astype(np.float64) * LN10)
+    seen = np.nan_to_num(seen)
+    total = _sum(seen)
+    return np.where(total > 0, seen, plain) / np.where(total > 0, total, plain.sum())
+
+
+def loglinear(log10_probs: Singles, weights: Sequence[float]) -> Singles:
+    """The weighted sum of the log probabilities, float32 (T,), not normalised."""
+    total = np.zeros(log10_probs.shape[1:], np.float32)
+    for log10_p, weight in zip(log10_probs, weights, strict=True):
+        if weight:
+            total = (total + (weight * log10_p.astype(np.float64))).astype(np.float32)
+    return total
+
+
+def _sum(weights: Floats) -> Floats:
+    total = np.zeros(weights.shape[1])
+    for weight in weights:
+        total = total + weight
+    return total
+
+
+class Cache:
+    """The last `size` words before each word of a text, as an estimate of its probability.
+
+    `ids` int64 (T,) is the text; `counted` bool (T,) the words that enter the cache.
+    """
+
+    def __init__(self, ids: Ints, counted: Mask, size: int) -> None:
+        places = np.flatnonzero(counted)
+        self.stop: Ints = np.cumsum(counted) - counted
+        self.start = np.maximum(0, self.stop - size)
+        self.words = ids[places]
+        # Word by word, in the order of the text: how often a word stands between two places is a difference.
+        self._width = len(places) + 1
+        self._sorted = np.sort(self.words * self._width + np.arange(len(places)))
+
+    def shares(self, words: Ints) -> Floats:
+        """The share of the cache that each of `words` (T,) has in its place, float64 (T,); 0 where it is empty."""
+        held = np.searchsorted(self._sorted, words * self._width + self.stop)
+        held = held - np.searchsorted(self._sorted, words * self._width + self.start)
+        shares: Floats = np.where(words >= 0, held, 0) / np.maximum(1, self.stop - self.start)
+        return shares
+
+    def distribution(self, t: int, size: int) -> Floats:
+        """The share of each of `size` words in the cache at word `t`, float64 (size,)."""
+        recent = self.words[self.start[t] : self.stop[t]]
+        return np.bincount(recent, minlength=size)[:size] / max(1, len(recent))
+
+
+def with_cache(log10_p: Singles, shares: Floats, weight: float) -> Singles:
+    """log10 of (1 - weight) p + weight * share, float32 (T,); the share takes the way over its float32 logarithm."""
+    return log10((1 - weight) * p_of(log10_p) + weight * p_of(log10(shares)))

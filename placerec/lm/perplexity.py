@@ -38,12 +38,12 @@ class Totals(NamedTuple):
         return Totals(*(weight * value for value in self))
 
     @property
-    def perplexity(self) -> float | None:
+    def ppl(self) -> float | None:
         """Per word and sentence end; None where nothing was predicted."""
         return _perplexity(self.log10_p, self.words - self.oovs - self.zeroprobs + self.sentences)
 
     @property
-    def perplexity_per_word(self) -> float | None:
+    def ppl1(self) -> float | None:
         """Per word, sentence ends' probabilities included but not counted (SRILM's ppl1)."""
         return _perplexity(self.log10_p, self.words - self.oovs - self.zeroprobs)
 
@@ -76,17 +76,11 @@ def measure(model: "BackoffModel", sentences: Iterable[Sequence[str]]) -> Totals
     return Totals(*rows.sum(axis=0).tolist())
 
 
-def tally(log10_p: Singles, unknown: Mask, *, ended: bool) -> Totals:
-    """The totals of one sentence's words: `log10_p` float32 (T,), `unknown` bool (T,); `ended`: the last is </s>."""
-    T = len(log10_p)
-    (row,) = tally_sentences(log10_p, unknown, np.ones(T, bool), np.array([T]), np.array([ended]))
-    return Totals(*row.tolist())
-
-
 def tally_sentences(log10_p: Singles, unknown: Mask, scored: Mask, lengths: Ints, ended: Mask) -> Floats:
-    """The same sentence by sentence, float64 (S, 5), columns as the fields of Totals.
+    """The totals of S sentences of T words, float64 (S, 5), columns as the fields of Totals.
 
-    `scored` bool (T,): the words that count; `lengths` int64 (S,); `ended` bool (S,): the last word is the end.
+    `log10_p` float32 (T,), `unknown` bool (T,) of the words, `scored` bool (T,): which count; `lengths` int64 (S,);
+    `ended` bool (S,): the last word is the end.
     """
     some = np.flatnonzero(lengths)
     starts = (np.cumsum(lengths) - lengths)[some]

@@ -58,18 +58,18 @@ def default_delta(name: str) -> float:
 
 
 def _fixed(discount: Discount) -> Fit:
-    return lambda counts, n, event: (counts, discount)
+    return lambda counts, n, predictable: (counts, discount)
 
 
-def _kneser_ney(counts: NgramCounts, n: int, event: Mask) -> tuple[NgramCounts, Discount]:
+def _kneser_ney(counts: NgramCounts, n: int, predictable: Mask) -> tuple[NgramCounts, Discount]:
     """Kneser & Ney 1995: one discount an order, lower orders by numbers of left neighbours."""
-    counts, tally = _neighbours(counts, n, event)
+    counts, tally = _neighbours(counts, n, predictable)
     return counts, absolute(_explained(n, tally, lambda: kneser_ney_discount(*tally[:2])))
 
 
-def _modified_kneser_ney(counts: NgramCounts, n: int, event: Mask) -> tuple[NgramCounts, Discount]:
+def _modified_kneser_ney(counts: NgramCounts, n: int, predictable: Mask) -> tuple[NgramCounts, Discount]:
     """Chen & Goodman 1998: three discounts an order."""
-    counts, tally = _neighbours(counts, n, event)
+    counts, tally = _neighbours(counts, n, predictable)
     discounts = _explained(n, tally, lambda: modified_kneser_ney_discounts(*tally))
     if min(discounts) < 0:
         shown = ", ".join(f"{discount:.3g}" for discount in discounts)
@@ -82,10 +82,10 @@ def _modified_kneser_ney(counts: NgramCounts, n: int, event: Mask) -> tuple[Ngra
 _REMEDY = "closed vocabularies of few words are like that; use witten-bell"
 
 
-def _neighbours(counts: NgramCounts, n: int, event: Mask) -> tuple[NgramCounts, list[int]]:
+def _neighbours(counts: NgramCounts, n: int, predictable: Mask) -> tuple[NgramCounts, list[int]]:
     if n < counts.order:
-        counts = left_neighbour_counts(counts, n, event)
-    return counts, counts_of_counts(counts, n, 4, event, np.zeros(len(event), np.int64))[1:].tolist()
+        counts = left_neighbour_counts(counts, n, predictable)
+    return counts, counts_of_counts(counts, n, 4, predictable, np.zeros(len(predictable), np.int64))[1:].tolist()
 
 
 def _explained(n: int, tally: list[int], compute: Callable[[], T]) -> T:

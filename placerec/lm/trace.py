@@ -13,7 +13,7 @@ class Trace:
         """`count` contexts of order n end in </s> or hold a closed <unk>."""
 
     def discarded_ngrams(self, n: int, non_events: int, discounted: int) -> None:
-        """N-grams of order n left out: their last word is no event; their count is below the minimum."""
+        """N-grams of order n left out: their last word is not predictable; their count is below the minimum."""
 
     def probabilities(
         self,

@@ -7,12 +7,9 @@ Simplified: one word an image. The original describes sub-windows with CENTRIST 
 (from memory).
 """
 
-from dataclasses import replace
-
-import numpy as np
-
 from placerec.hohmm import Emissions
-from placerec.lm import BackoffModel, count_ngrams
+from placerec.lm import count_ngrams
+from placerec.lm.arpa import as_printed
 from placerec.lm.backoff import unite_models
 from placerec.methods.training_set import TrainingSet
 from placerec.model import ModelOptions, estimate_place
@@ -23,10 +20,4 @@ def fit(training: TrainingSet) -> Emissions:
     options = ModelOptions(1, "lidstone-backoff", training.delta)
     texts = [[[training.vocabulary[i] for i in visit] for visit in visits] for visits in training.sentences]
     counted = [count_ngrams(text, 1, vocabulary=training.vocabulary) for text in texts]
-    return unite_models([_as_in_arpa(estimate_place(counts, options)) for counts in counted])
-
-
-def _as_in_arpa(model: BackoffModel) -> BackoffModel:
-    """The model with seven significant digits."""
-    rounded = [float(f"{p:.7g}") for p in model.log10_ps[0].tolist()]
-    return replace(model, log10_ps=(np.array(rounded, np.float32),))
+    return unite_models([as_printed(estimate_place(counts, options)) for counts in counted])

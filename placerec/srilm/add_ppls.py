@@ -4,12 +4,12 @@ import math
 import re
 from collections.abc import Sequence
 
+from placerec.lm.logs import LN10
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import SrilmError, Streams, exit_status
 
 TOOL = "add-ppls"
 USAGE = "usage: {tool} [PPL ...]  (outputs of ngram -ppl; default: standard input)"
-LN10 = 2.30258509299404568402
 _NUMBER = r"(\S+)"
 _FIRST = re.compile(rf"file .*: {_NUMBER} sentences, {_NUMBER} words, {_NUMBER} OOVs\s*$")
 _SECOND = re.compile(rf"{_NUMBER} zeroprobs, logprob= {_NUMBER} ")

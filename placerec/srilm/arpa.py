@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from placerec.arrays import Ints
-from placerec.lm.draft import Draft
+from placerec.lm.mutable import MutableModel
 from placerec.lm.score import ScoreTables
 from placerec.lm.trie import closed_trie
 from placerec.srilm.arpa_block import Block
@@ -24,7 +24,7 @@ def read_model(
     debug: int = 0,
     limited: bool = False,
     what: str = "lm file",
-) -> tuple[Draft, ContextTimes]:
+) -> tuple[MutableModel, ContextTimes]:
     """Read an ARPA file up to `order`, adding its words to `words`, and say what is odd about it.
 
     `limited`: n-grams with other words than those of `words` are left out. Raises SrilmError, calling the file a
@@ -33,12 +33,12 @@ def read_model(
     expected = len(words.index)
     reader = Reader(name, words, streams, order, limited)
     reader.read()
-    draft, times = assemble(reader, expected)
+    model, times = assemble(reader, expected)
     reader.finish(debug, what)
-    return draft, times
+    return model, times
 
 
-def assemble(reader: Reader, expected: int = 0) -> tuple[Draft, ContextTimes]:
+def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTimes]:
     """The model of what was read: n-grams whose context has no weight at that point of the file are dropped.
 
     `expected`: the size of vocabulary that SRILM makes the model for.
@@ -49,8 +49,8 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[Draft, ContextTimes]:
     groups = [sorted_number[block.words] for _, block in blocks]
     trie, rows = closed_trie(vocabulary, reader.order, groups)
     names = np.array(reader.words.names(vocabulary), np.int64)
-    draft = Draft(trie, ~vocabulary.mask(reader.words.non_events), names)
-    created = _weights(draft, blocks, rows)
+    model = MutableModel(trie, ~vocabulary.mask(reader.words.non_events), names)
+    created = _weights(model, blocks, rows)
     for (n, block), row in zip(blocks, rows, strict=False):
         kept = np.ones(len(block.lines), bool)
         if n > 1:
@@ -60,38 +60,38 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[Draft, ContextTimes]:
                 line = int(block.lines[i])
                 message = f'{reader.name}: line {line}: warning: no bow for prefix of ngram "{ngram}"'
                 reader.said.append((line, 0, message))
-        draft.stored[n - 1][row[-1][kept]] = True
+        model.stored[n - 1][row[-1][kept]] = True
         # Of several values for one row the last is kept: the file's last.
-        draft.log10_p[n - 1][row[-1][kept]] = block.log10_p[kept]
+        model.log10_p[n - 1][row[-1][kept]] = block.log10_p[kept]
     reader.warn_of_unknown()
-    draft.refresh_all()
+    model.refresh_all()
     numbers = np.full(len(vocabulary), -1, np.int64)
     numbers[sorted_number[sorted_number >= 0]] = np.flatnonzero(sorted_number >= 0)
-    return draft, ContextTimes(trie, created, numbers, expected)
+    return model, ContextTimes(trie, created, numbers, expected)
 
 
-def tables_of(draft: Draft, words: WordList) -> ScoreTables:
+def tables_of(model: MutableModel, words: WordList) -> ScoreTables:
     """The tables that give words, by SRILM's number, the probabilities of a model."""
-    index = draft.trie.vocabulary.index
+    index = model.trie.vocabulary.index
     numbers = np.full(len(index), -1)
     for number, word in enumerate(words.words):
         if word in index:
             numbers[index[word]] = number
-    return draft.tables(numbers, len(words.words))
+    return model.tables(numbers, len(words.words))
 
 
-def _weights(draft: Draft, blocks: Sequence[tuple[int, Block]], rows: Sequence[Sequence[Ints]]) -> list[Ints]:
+def _weights(model: MutableModel, blocks: Sequence[tuple[int, Block]], rows: Sequence[Sequence[Ints]]) -> list[Ints]:
     """Make contexts of the n-grams with weights; per order, the line at which each row became one, int64 (m_n,)."""
-    trie = draft.trie
+    trie = model.trie
     created = [np.full(len(keys), NEVER) for keys in trie.keys]
     for (n, block), row in zip(blocks, rows, strict=False):
         if n < trie.order:
             its, lines = row[-1][block.weighted], block.lines[block.weighted]
             np.minimum.at(created[n - 1], its, lines)
-            draft.backoff[n - 1][its] = block.backoff[block.weighted]
+            model.backoff[n - 1][its] = block.backoff[block.weighted]
     for n in range(trie.order - 1, 0, -1):
         nodes = np.flatnonzero(created[n - 1] < NEVER)
-        draft.node[n - 1][nodes] = True
+        model.is_context[n - 1][nodes] = True
         if n > 1:
             np.minimum.at(created[n - 2], trie.suffixes[n - 1][nodes], created[n - 1][nodes])
     return created

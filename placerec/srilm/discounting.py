@@ -99,11 +99,11 @@ def choose(options: Parsed, n: int, *, model_wanted: bool) -> Choice | None:
 class Fitter:
     """Fits the discounts of all orders in turn; the Kneser-Ney methods change the lower orders of `counts`.
 
-    `event` bool (V,): words that are predicted; `meta` int64 (V,): k where a word stands for k occurrences.
+    `predictable` bool (V,): words that are predicted; `meta` int64 (V,): k where a word stands for k occurrences.
     """
 
     counts: NgramCounts
-    event: Mask
+    predictable: Mask
     meta: Ints
     options: Parsed
     streams: Streams
@@ -150,7 +150,7 @@ class Fitter:
 
     def _good_turing(self, n: int, choice: Choice) -> Rule:
         top = max(0, choice.maximum)
-        tally = counts_of_counts(self.counts, n, top + 1, self.event, self.meta)
+        tally = counts_of_counts(self.counts, n, top + 1, self.predictable, self.meta)
         if self.debug:
             self.streams.say(f"Good-Turing discounting {n}-grams")
             for k, number in enumerate(tally.tolist()):
@@ -169,7 +169,7 @@ class Fitter:
         if not late:
             self.prepare(n)
         modified = choice.method == "kndiscount"
-        numbers = counts_of_counts(self.counts, n, 4, self.event, self.meta)[1:].tolist()
+        numbers = counts_of_counts(self.counts, n, 4, self.predictable, self.meta)[1:].tolist()
         if self.debug:
             self.streams.say(f"Kneser-Ney smoothing {n}-grams")
             for k, number in enumerate(numbers[: 4 if modified else 2], start=1):
@@ -194,7 +194,7 @@ class Fitter:
             return False
         if self.debug and not silent:
             self.streams.say(MODIFYING.format(n))
-        self.counts = left_neighbour_counts(self.counts, n, self.event)
+        self.counts = left_neighbour_counts(self.counts, n, self.predictable)
         self.modified.add(n)
         return True
 

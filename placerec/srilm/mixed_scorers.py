@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.arrays import Ints, Singles
-from placerec.lm.dynamic import Cache, loglinear, mixed, posteriors, with_cache
 from placerec.lm.logs import p_of
+from placerec.lm.mix import Cache, loglinear, mixed, posteriors, with_cache
 from placerec.lm.score import TokenSequence
 from placerec.srilm.scorers import Model, ModelView, Scored, Scorer, View, event_numbers
 from placerec.srilm.vocabulary import WordList
@@ -48,17 +48,17 @@ class MixtureView:
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""
         parts = [view.score(words) for view in self.views]
-        log10_ps = np.stack([part.log10_p for part in parts])
+        log10_probs = np.stack([part.log10_p for part in parts])
 
         def tag(t: int) -> str:
             found = "".join(part.tag(t) for part in parts)
             if self.mixture.length > 0:
                 found += "[post=" + ",".join(f"{weight:.7g}" for weight in self.posteriors[:, t]) + "]"
             if self.mixture.detailed:
-                found += "[probs=" + ",".join(f"{p:.7g}" for p in p_of(log10_ps[:, t])) + "]"
+                found += "[probs=" + ",".join(f"{p:.7g}" for p in p_of(log10_probs[:, t])) + "]"
             return found
 
-        return Scored(mixed(log10_ps, self.posteriors), tag)
+        return Scored(mixed(log10_probs, self.posteriors), tag)
 
     def distribution(self, t: int) -> Singles:
         """log10 p of every word."""

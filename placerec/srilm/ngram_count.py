@@ -8,8 +8,8 @@ from placerec.lm.arpa import arpa_blocks
 from placerec.lm.count_statistics import recomputed
 from placerec.lm.counts import NgramCounts, add_counts, format_counts
 from placerec.lm.discounts import Rule
-from placerec.lm.draft import insert_prefixes
-from placerec.lm.estimation import estimate_draft
+from placerec.lm.estimation import estimate_mutable
+from placerec.lm.mutable import insert_prefixes
 from placerec.lm.prune import prune
 from placerec.srilm.counts_file import Table, read_counts
 from placerec.srilm.discounting import MODIFYING, Fitter, choose, given_method, meta_occurrences
@@ -172,8 +172,9 @@ def _read_text(options: Parsed, words: WordList, streams: Streams) -> Text:
 def _fitter(options: Parsed, counts: NgramCounts, words: WordList, streams: Streams) -> Fitter:
     vocabulary = counts.trie.vocabulary
     meta = meta_occurrences(vocabulary.words, options["meta-tag"])
-    event = ~vocabulary.mask(words.non_events) & ~np.array([words.is_meta(word) for word in vocabulary.words], bool)
-    return Fitter(counts, event, meta, options, streams, options["debug"], options["float-counts"])
+    meta_words = np.array([words.is_meta(word) for word in vocabulary.words], bool)
+    predictable = ~vocabulary.mask(words.non_events) & ~meta_words
+    return Fitter(counts, predictable, meta, options, streams, options["debug"], options["float-counts"])
 
 
 def _write_model(
@@ -184,7 +185,7 @@ def _write_model(
     late = fitter.prepare_late()
     announced = {n: MODIFYING.format(n) for n in late}
     trace = EstimationMessages(fitter.counts, first, streams, options["debug"], announced=announced)
-    draft = estimate_draft(
+    mutable = estimate_mutable(
         fitter.counts,
         rules,
         non_events=words.non_events,
@@ -192,13 +193,13 @@ def _write_model(
         unknown=words.unknown,
         meta_tag=options["meta-tag"],
         trust_totals=options["trust-totals"],
-        names=np.array(words.names(fitter.counts.trie.vocabulary), np.int64),
+        alias_counts=np.array(words.names(fitter.counts.trie.vocabulary), np.int64),
         trace=trace,
     )
-    insert_prefixes(draft, trace)
+    insert_prefixes(mutable, trace)
     if options["prune"] > 0:
-        prune(draft, options["prune"], shortest=options["minprune"], trace=trace)
-    model = draft.model()
+        prune(mutable, options["prune"], shortest=options["minprune"], trace=trace)
+    model = mutable.model()
     if options["debug"] >= 1:
         for n, keys in enumerate(model.trie.keys, start=1):
             streams.say(f"writing {len(keys)} {n}-grams")

@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 
 from placerec.lm.arpa import row_blocks
-from placerec.lm.draft import Draft, reweigh, unite
 from placerec.lm.mix import merge, merge_weight
+from placerec.lm.mutable import MutableModel, reweigh, unite
 from placerec.lm.prune import prune, prune_improbable
 from placerec.lm.score import TokenSequence
 from placerec.srilm.arpa import read_model, tables_of
@@ -28,7 +28,7 @@ class Models:
         self.order = max(1, options["order"])
         self.debug = options["debug"]
         self.words = words
-        self.draft: Draft | None = None
+        self.mutable: MutableModel | None = None
         self.times: ContextTimes | None = None
 
     def scorer(self) -> Scorer:
@@ -36,14 +36,14 @@ class Models:
         if self.options["null"]:
             scorer: Scorer = Null(self.words)
         else:
-            self.draft, self.times = self.read("lm", "lm file")
+            self.mutable, self.times = self.read("lm", "lm file")
             scorer = self.with_cache(self.mixed())
         scorer = self.lenient(scorer)
         return self.rescored(scorer) if self.options["rescore-ngram"] else scorer
 
     def read(
         self, option: str, what: str, *, order: int | None = None, words: WordList | None = None
-    ) -> tuple[Draft, ContextTimes]:
+    ) -> tuple[MutableModel, ContextTimes]:
         """Read the model that an option names."""
         return read_model(
             self.options[option],
@@ -55,18 +55,18 @@ class Models:
             what=what,
         )
 
-    def together(self, *drafts: Draft) -> list[Draft]:
+    def together(self, *mutables: MutableModel) -> list[MutableModel]:
         """The models over one trie and all words known by now."""
         vocabulary, _ = self.words.sorted()
-        if len(drafts) == 1 and drafts[0].trie.vocabulary.words == vocabulary.words:
-            return [*drafts]
+        if len(mutables) == 1 and mutables[0].trie.vocabulary.words == vocabulary.words:
+            return [*mutables]
         names = np.array(self.words.names(vocabulary), np.int64)
-        return unite(drafts, vocabulary, ~vocabulary.mask(self.words.non_events), names)
+        return unite(mutables, vocabulary, ~vocabulary.mask(self.words.non_events), names)
 
-    def messages(self, draft: Draft) -> Messages:
+    def messages(self, mutable: MutableModel) -> Messages:
         """Who says what happens to a model."""
-        order = message_order(draft.trie, self.times) if self.times else None
-        return Messages(draft.trie, self.streams, self.debug, weighed=order)
+        order = message_order(mutable.trie, self.times) if self.times else None
+        return Messages(mutable.trie, self.streams, self.debug, weighed=order)
 
     def components(self) -> tuple[list[str], list[float]]:
         """The options that name models to mix in, and the weights of all models, -lm's first."""
@@ -85,55 +85,55 @@ class Models:
         dynamic = options["bayes"] is not None or options["loglinear-mix"]
         if not dynamic:
             for k, option in enumerate(others, start=1):
-                self.draft, other = self.together(self.model(), self.read(option, "mix-lm file")[0])
-                merge(self.draft, other, merge_weight(weights, k), self.messages(self.draft))
+                self.mutable, other = self.together(self.model(), self.read(option, "mix-lm file")[0])
+                merge(self.mutable, other, merge_weight(weights, k), self.messages(self.mutable))
         self.change()
         model = Model(partial(tables_of, self.model(), self.words), self.words, skipping=options["skipoovs"])
         if not dynamic or not others:
             return model
-        drafts = [self.read(option, "mix-lm file")[0] for option in others]
-        models = [model, *(Model(partial(tables_of, draft, self.words), self.words) for draft in drafts)]
-        self.draft = None
+        mutables = [self.read(option, "mix-lm file")[0] for option in others]
+        models = [model, *(Model(partial(tables_of, mutable, self.words), self.words) for mutable in mutables)]
+        self.mutable = None
         if options["loglinear-mix"]:
             return LogLinear(models, weights, self.words)
         return Mixture(models, weights, options["bayes"], options["bayes-scale"], self.debug == 3)
 
-    def model(self) -> Draft:
+    def model(self) -> MutableModel:
         """The model that was read; there is one wherever this is called."""
-        assert self.draft is not None
-        return self.draft
+        assert self.mutable is not None
+        return self.mutable
 
     def change(self) -> None:
         """`-renorm`, `-prune` and `-prune-lowprobs`."""
         options = self.options
         if options["renorm"]:
-            (draft,) = self.together(self.model())
+            (mutable,) = self.together(self.model())
             least = options["minbackoff"]
-            reweigh(draft, self.messages(draft), minimum=least if least is not None and 0 <= least <= 1 else None)
-            self.draft = draft
+            reweigh(mutable, self.messages(mutable), minimum=least if least is not None and 0 <= least <= 1 else None)
+            self.mutable = mutable
         if options["prune"] > 0:
-            draft, history = self.pruned_by()
-            trace = self.messages(draft)
-            prune(draft, options["prune"], shortest=options["minprune"], history=history, trace=trace)
-            self.draft = draft
+            mutable, history = self.pruned_by()
+            trace = self.messages(mutable)
+            prune(mutable, options["prune"], shortest=options["minprune"], history=history, trace=trace)
+            self.mutable = mutable
         if options["prune-lowprobs"]:
-            (draft,) = self.together(self.model())
-            prune_improbable(draft, shortest=options["minprune"], trace=self.messages(draft))
-            self.draft = draft
+            (mutable,) = self.together(self.model())
+            prune_improbable(mutable, shortest=options["minprune"], trace=self.messages(mutable))
+            self.mutable = mutable
 
-    def pruned_by(self) -> tuple[Draft, Draft | None]:
+    def pruned_by(self) -> tuple[MutableModel, MutableModel | None]:
         """The model to prune and the one that says how probable contexts are."""
         if not self.options["prune-history-lm"]:
             return self.together(self.model())[0], None
         history, _ = self.read("prune-history-lm", "history LM file", order=max(1, self.order - 1))
-        draft, wider = self.together(self.model(), history)
-        return draft, wider
+        mutable, wider = self.together(self.model(), history)
+        return mutable, wider
 
     def with_cache(self, scorer: Scorer) -> Scorer:
         """`-cache`."""
         if not self.options["cache"]:
             return scorer
-        self.draft = None
+        self.mutable = None
         return Cached(scorer, self.words, self.options["cache"], self.options["cache-lambda"])
 
     def lenient(self, scorer: Scorer) -> Scorer:
@@ -149,29 +149,29 @@ class Models:
         """`-rescore-ngram` (section 11.6): another model's n-grams with the probabilities that `scorer` gives them."""
         options = self.options
         own = WordList(lower=options["tolower"], open_unknown=options["unk"])
-        draft, self.times = self.read("rescore-ngram", "lm file", words=own)
+        mutable, self.times = self.read("rescore-ngram", "lm file", words=own)
         index, unknown = self.words.index, self.words.index[self.words.unknown]
-        numbers = np.array([index.get(word, unknown) for word in draft.trie.vocabulary.words], np.int64)
-        for n in range(draft.order, 0, -1):
-            rows = np.flatnonzero(draft.stored[n - 1])
-            sequence = TokenSequence.of_rows(numbers[draft.trie.matrix(n)[rows]])
-            draft.log10_p[n - 1][rows] = scorer.view(sequence).score().log10_p[n - 1 :: n]
-        reweigh(draft, self.messages(draft))
-        self.draft, self.words = draft, own
-        return Model(partial(tables_of, draft, own), own)
+        numbers = np.array([index.get(word, unknown) for word in mutable.trie.vocabulary.words], np.int64)
+        for n in range(mutable.order, 0, -1):
+            rows = np.flatnonzero(mutable.stored[n - 1])
+            sequence = TokenSequence.of_rows(numbers[mutable.trie.matrix(n)[rows]])
+            mutable.log10_p[n - 1][rows] = scorer.view(sequence).score().log10_p[n - 1 :: n]
+        reweigh(mutable, self.messages(mutable))
+        self.mutable, self.words = mutable, own
+        return Model(partial(tables_of, mutable, own), own)
 
     def write(self, name: str) -> None:
         """`-write-lm`."""
-        draft = self.draft
-        if draft is None:
+        mutable = self.mutable
+        if mutable is None:
             self.streams.write(name, "")
             self.streams.say("write() method not implemented")
             self.streams.say(f"error writing {name}")
             return
         if self.debug >= 1:
-            for n, stored in enumerate(draft.stored, start=1):
+            for n, stored in enumerate(mutable.stored, start=1):
                 self.streams.say(f"writing {int(stored.sum())} {n}-grams")
         with self.streams.output(name) as file:
             # SRILM writes an n-gram though its first words are not listed.
-            columns = draft.log10_p, draft.backoff, draft.node
-            file.writelines(row_blocks(draft.trie, *columns, stored=draft.stored, encoding="latin-1"))
+            columns = mutable.log10_p, mutable.backoff, mutable.is_context
+            file.writelines(row_blocks(mutable.trie, *columns, stored=mutable.stored, encoding="latin-1"))

@@ -23,7 +23,7 @@ def block(totals: Totals, ranks: Ranks | None = None) -> str:
     text = f"{totals.sentences:.16g} sentences, {totals.words:.16g} words, {totals.oovs:.16g} OOVs\n"
     if not totals.words + totals.sentences > 0:
         return text
-    ppl, ppl1 = _perplexity(totals.perplexity), _perplexity(totals.perplexity_per_word)
+    ppl, ppl1 = _perplexity(totals.ppl), _perplexity(totals.ppl1)
     text += f"{totals.zeroprobs:.16g} zeroprobs, logprob= {_number(totals.log10_p)} ppl= {ppl} ppl1= {ppl1}\n"
     return text if ranks is None else text + _rank_lines(ranks)
 

@@ -126,7 +126,7 @@ def as_dictionaries(model: BackoffModel) -> reference.Model:
     """The same model for the plain twin."""
     p, weight = {}, {}
     for n in range(1, model.order + 1):
-        columns = model.trie.texts(n), model.log10_ps[n - 1].tolist(), model.backoffs[n - 1].tolist()
+        columns = model.trie.texts(n), model.log10_probs[n - 1].tolist(), model.backoffs[n - 1].tolist()
         for text, log10_p, backoff in zip(*columns, strict=True):
             p[tuple(text.split(" "))] = 10**log10_p
             if not math.isnan(backoff):

@@ -6,11 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.small_experiment import write_grid
-from hypothesis import given
-from hypothesis import strategies as st
 
 from placerec.experiments.grid import read_config
-from placerec.experiments.grid.cells import CellJob, GridCell, believe_cell, describe_data, seven_digits
+from placerec.experiments.grid.cells import CellJob, GridCell, believe_cell, describe_data
 from placerec.experiments.grid.run import run_grid
 from placerec.figures import evaluate_files
 from placerec.hohmm import Beliefs, read_beliefs
@@ -69,17 +67,6 @@ def test_beliefs_are_those_of_decode_to_the_last_digit(tmp_path: Path) -> None:
         (found,) = believe_cell(job, cell)
         assert np.array_equal(found.belief, wanted.belief)
         assert found.best == wanted.best
-
-
-@given(st.floats(-98, 98, width=32))
-def test_seven_digits_are_those_of_a_file(value: float) -> None:
-    exact = np.array([value], np.float32)
-    assert seven_digits(exact)[0] == np.float32(f"{exact[0]:.7g}")
-
-
-def test_seven_digits_keep_what_is_no_number() -> None:
-    values = np.array([-np.inf, np.nan, 0, -99], np.float32)
-    assert np.array_equal(seven_digits(values), values, equal_nan=True)
 
 
 def test_runs_of_words_are_cut_at_the_ends_of_sequences() -> None:

@@ -30,7 +30,7 @@ import numpy as np
 from placerec.errors import PlacerecError
 from placerec.lm import estimation
 from placerec.lm.arpa import format_arpa, read_arpa, write_arpa
-from placerec.lm.inspection import inspect_model
+from placerec.lm.inspect import inspect_model
 from placerec.srilm import arpa_reader, sentences
 from placerec.srilm.ngram import ngram
 from placerec.srilm.ngram_count import ngram_count
@@ -170,7 +170,7 @@ def check_strict(path: Path, rng: Random) -> None:
         model = read_arpa(path)
     except PlacerecError:
         return
-    for n, (log10_p, backoff) in enumerate(zip(model.log10_ps, model.backoffs, strict=True), start=1):
+    for n, (log10_p, backoff) in enumerate(zip(model.log10_probs, model.backoffs, strict=True), start=1):
         if not (log10_p <= 0).all():
             raise FindingError(f"no log10 probability in order {n}: {log10_p[~(log10_p <= 0)]}")
         if np.isposinf(backoff).any():

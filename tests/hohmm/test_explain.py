@@ -44,7 +44,7 @@ def test_the_numbers_are_those_of_the_filter_and_the_models(words: list[str], or
             assert len(place["backoffs"]) == len(one["history"]) + 1 - place["order"]
             answer = [*one["history"], words[i]][-place["order"] :]
             listed = models[name].trie.texts(place["order"]).index(" ".join(answer))
-            paid = place["log10_p"] - float(models[name].log10_ps[place["order"] - 1][listed])
+            paid = place["log10_p"] - float(models[name].log10_probs[place["order"] - 1][listed])
             assert sum(place["backoffs"]) == pytest.approx(paid, abs=1e-4)
 
 

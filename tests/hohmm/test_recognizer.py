@@ -53,7 +53,7 @@ def as_twin(model: BackoffModel) -> reference.Model:
     weight: dict[tuple[str, ...], float] = {}
     for n in range(1, model.order + 1):
         for text, log10_p, backoff in zip(
-            model.trie.texts(n), model.log10_ps[n - 1].tolist(), model.backoffs[n - 1].tolist(), strict=True
+            model.trie.texts(n), model.log10_probs[n - 1].tolist(), model.backoffs[n - 1].tolist(), strict=True
         ):
             p[tuple(text.split(" "))] = 10**log10_p
             if not math.isnan(backoff):

@@ -9,7 +9,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.errors import LanguageModelError
-from placerec.lm import SMOOTHINGS, count_ngrams, estimate, format_arpa, read_arpa, smoothing, with_unigrams, write_arpa
+from placerec.lm import (
+    SMOOTHINGS,
+    BackoffModel,
+    count_ngrams,
+    estimate,
+    format_arpa,
+    read_arpa,
+    smoothing,
+    with_unigrams,
+    write_arpa,
+)
+from placerec.lm.arpa import as_printed
+from placerec.lm.trie import Trie, Vocabulary
 
 # Orders and markers that KenLM does not do without: rules of its own, not of the format.
 KENLM_ONLY = {
@@ -44,7 +56,7 @@ def test_what_is_written_is_read_back(
     assert back.words == model.words
     for n in range(order):
         assert np.array_equal(back.trie.keys[n], model.trie.keys[n])
-        assert np.allclose(back.log10_ps[n], model.log10_ps[n], rtol=1e-6, atol=1e-6)
+        assert np.allclose(back.log10_probs[n], model.log10_probs[n], rtol=1e-6, atol=1e-6)
     assert format_arpa(back) == format_arpa(model)
 
 
@@ -112,3 +124,21 @@ def test_not_utf8_is_named(tmp_path: Path) -> None:
     path.write_bytes(GOOD.replace("a b", "\xe9 b").encode("latin-1"))
     with pytest.raises(LanguageModelError, match=r"latin\.arpa:11: byte 0xe9 is not UTF-8"):
         read_arpa(path)
+
+
+def model_of(log10_probs: list[float]) -> BackoffModel:
+    vocabulary = Vocabulary.of(f"w{i}" for i in range(len(log10_probs)))
+    values = np.array(log10_probs, np.float32)
+    return BackoffModel(Trie(vocabulary, (np.arange(len(values)),)), (values,), (values,))
+
+
+@given(st.lists(st.floats(-98, 0, width=32), min_size=1, max_size=9))
+def test_a_model_as_printed_is_that_of_its_file(values: list[float]) -> None:
+    printed = as_printed(model_of(values))
+    assert printed.log10_probs[0].tolist() == [np.float32(f"{value:.7g}") for value in values]
+    assert printed.backoffs[0].tolist() == printed.log10_probs[0].tolist()
+
+
+def test_what_is_no_number_is_printed_as_such() -> None:
+    model = model_of([-np.inf, np.nan, 0, -99])
+    assert np.array_equal(as_printed(model).log10_probs[0], model.log10_probs[0], equal_nan=True)

@@ -59,12 +59,12 @@ def _model(rng: np.random.Generator, words: list[str]) -> BackoffModel:
     for _ in range(3):
         every = len(keys[-1]) * len(vocabulary)
         keys.append(np.sort(rng.choice(every, min(every, 60_000), replace=False)))
-    log10_ps = tuple((-8 * rng.random(len(key))).astype(np.float32) for key in keys)
+    log10_probs = tuple((-8 * rng.random(len(key))).astype(np.float32) for key in keys)
     backoffs = tuple(rng.normal(size=len(key)).astype(np.float32) for key in keys)
     for backoff in backoffs:
         backoff[rng.random(len(backoff)) < 0.3] = np.nan
     backoffs[-1][:] = np.nan
-    return BackoffModel(Trie(vocabulary, tuple(keys)), log10_ps, backoffs)
+    return BackoffModel(Trie(vocabulary, tuple(keys)), log10_probs, backoffs)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_a_big_file_reads_as_the_model(tmp_path_factory: pytest.TempPathFactory)
     path.write_text(format_arpa(model), encoding="utf-8")
     again = read_arpa(path)
     assert all(np.array_equal(a, b) for a, b in zip(again.trie.keys, model.trie.keys, strict=True))
-    for a, b in zip(again.log10_ps, model.log10_ps, strict=True):
+    for a, b in zip(again.log10_probs, model.log10_probs, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-6)
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from placerec import reference
 from placerec.errors import LanguageModelError
 from placerec.lm import SMOOTHINGS, BackoffModel, count_ngrams, estimate, format_arpa, smoothing
-from placerec.lm.checks import context_sums
+from placerec.lm.check import context_sums
 
 VOCABULARY = ["a", "b", "c", "d", "e"]
 CLOSED_SMOOTHINGS = {
@@ -93,9 +93,9 @@ def test_every_context_sums_to_one_and_no_word_is_impossible(
     for n, _, sums in context_sums(model):
         assert np.abs(sums - 1).max(initial=0) < 1e-5, n
     for history in itertools.chain([()], itertools.product(VOCABULARY, repeat=2)):
-        log10_ps = [model.log10_p(word, history) for word in VOCABULARY]
-        assert min(log10_ps) > -20
-        assert sum(10**p for p in log10_ps) == pytest.approx(1, abs=1e-5), history
+        log10_probs = [model.log10_p(word, history) for word in VOCABULARY]
+        assert min(log10_probs) > -20
+        assert sum(10**p for p in log10_probs) == pytest.approx(1, abs=1e-5), history
 
 
 def test_witten_bell_by_hand() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from placerec.errors import LanguageModelError
-from placerec.lm.inspection import format_inspection, inspect_model
+from placerec.lm.inspect import format_inspection, inspect_model
 
 ARPA = """# made by hand
 \\data\\

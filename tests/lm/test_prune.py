@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from placerec.arrays import Ints
 from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
-from placerec.lm.checks import context_sums
-from placerec.lm.draft import drafts_of, reweigh
-from placerec.lm.prune import prune, prune_improbable, pruned
+from placerec.lm.check import context_sums
+from placerec.lm.mutable import mutable_models, reweigh
+from placerec.lm.prune import joint_log10_p, prune, prune_improbable
 from placerec.lm.trace import SILENT, Trace
 
 SILENT_WORDS = ["<s>", "<unk>"]
@@ -25,6 +25,12 @@ def trained(sentences: list[list[str]], order: int = 3) -> BackoffModel:
 
 def sizes(model: BackoffModel) -> list[int]:
     return [len(keys) for keys in model.trie.keys]
+
+
+def pruned(model: BackoffModel, threshold: float, *, shortest: int = 2) -> BackoffModel:
+    (mutable,) = mutable_models([model], SILENT_WORDS)
+    prune(mutable, threshold, shortest=shortest)
+    return mutable.model()
 
 
 @settings(max_examples=30, deadline=None)
@@ -73,47 +79,58 @@ class Gone(Trace):
 
 
 def test_longest_n_grams_go_first() -> None:
-    (draft,) = drafts_of([trained([["a", "b", "c"], ["a", "b", "d"]])], SILENT_WORDS)
-    stored = [int(mask.sum()) for mask in draft.stored]
+    (mutable,) = mutable_models([trained([["a", "b", "c"], ["a", "b", "d"]])], SILENT_WORDS)
+    stored = [int(mask.sum()) for mask in mutable.stored]
     gone = Gone()
-    prune(draft, 10.0, trace=gone)
+    prune(mutable, 10.0, trace=gone)
     assert gone.counts == [(3, stored[2]), (2, stored[1])]
-    assert not draft.node[0].any()
-    assert not draft.node[1].any()
+    assert not mutable.is_context[0].any()
+    assert not mutable.is_context[1].any()
 
 
 def test_a_history_model_decides_how_much_a_context_matters() -> None:
     """With contexts that never occur nothing matters, and everything goes."""
     model = trained([["a", "b", "c"], ["a", "b", "d"]])
-    draft, history = drafts_of([model, trained([["d"]])], SILENT_WORDS)
+    mutable, history = mutable_models([model, trained([["d"]])], SILENT_WORDS)
     history.log10_p[0][:] = -np.inf
     history.refresh_all()
-    prune(draft, 1e-30, history=history)
-    assert not draft.stored[2].any()
+    prune(mutable, 1e-30, history=history)
+    assert not mutable.stored[2].any()
 
 
 def test_improbable_n_grams_go_until_none_is_left() -> None:
-    (draft,) = drafts_of([trained([list("abcabd"), list("abdacb"), list("ddd")])], SILENT_WORDS)
+    (mutable,) = mutable_models([trained([list("abcabd"), list("abdacb"), list("ddd")])], SILENT_WORDS)
     # Far below what backing off gives, and with weights that follow.
-    first = int(np.flatnonzero(draft.stored[2])[0])
-    draft.log10_p[2][first] = -6
-    draft.refresh_all()
-    reweigh(draft, SILENT)
-    prune_improbable(draft)
-    assert not draft.stored[2][first]
+    first = int(np.flatnonzero(mutable.stored[2])[0])
+    mutable.log10_p[2][first] = -6
+    mutable.refresh_all()
+    reweigh(mutable, SILENT)
+    prune_improbable(mutable)
+    assert not mutable.stored[2][first]
     for n in (2, 3):
-        rows = np.flatnonzero(draft.stored[n - 1])
-        weight = draft.backoff[n - 2][draft.trie.prefix(n)[rows]]
-        shorter = draft.backed_off(n - 1)[draft.trie.suffixes[n - 1][rows]]
-        assert (shorter + weight <= draft.log10_p[n - 1][rows] + 1e-6).all()
+        rows = np.flatnonzero(mutable.stored[n - 1])
+        weight = mutable.backoff[n - 2][mutable.trie.prefix(n)[rows]]
+        shorter = mutable.backed_off(n - 1)[mutable.trie.suffixes[n - 1][rows]]
+        assert (shorter + weight <= mutable.log10_p[n - 1][rows] + 1e-6).all()
 
 
 def test_contexts_that_lost_their_line_get_it_back(tmp_path: Path) -> None:
-    (draft,) = drafts_of([trained([list("abcabd"), list("abdacb"), list("ddd")])], SILENT_WORDS)
-    row = int(np.flatnonzero(draft.node[1])[0])
-    draft.log10_p[1][row] = -8
-    draft.refresh_all()
-    prune_improbable(draft)
-    assert draft.stored[1][draft.node[1]].all()
-    write_arpa(draft.model(), tmp_path / "m.lm")
+    (mutable,) = mutable_models([trained([list("abcabd"), list("abdacb"), list("ddd")])], SILENT_WORDS)
+    row = int(np.flatnonzero(mutable.is_context[1])[0])
+    mutable.log10_p[1][row] = -8
+    mutable.refresh_all()
+    prune_improbable(mutable)
+    assert mutable.stored[1][mutable.is_context[1]].all()
+    write_arpa(mutable.model(), tmp_path / "m.lm")
     assert read_arpa(tmp_path / "m.lm").order == 3
+
+
+def test_contexts_are_as_probable_as_their_words_one_after_the_other() -> None:
+    model = trained([["a", "b", "c"], ["a", "c"]])
+    (mutable,) = mutable_models([model], SILENT_WORDS)
+    index = mutable.trie.vocabulary.index
+    joint = joint_log10_p(mutable, 2, start=index["<s>"], end=index["</s>"])
+    row = {text: row for row, text in enumerate(mutable.trie.texts(2))}
+    assert joint[row["a b"]] == pytest.approx(model.log10_p("a") + model.log10_p("b", ["a"]))
+    # <s> counts as the end of the sentence before.
+    assert joint[row["<s> a"]] == pytest.approx(model.log10_p("</s>") + model.log10_p("a", ["<s>"]))

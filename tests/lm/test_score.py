@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from placerec.arrays import Ints
 from placerec.lm import BackoffModel, count_ngrams, estimate, score, smoothing, with_unigrams
 from placerec.lm.backoff import unite_models
-from placerec.lm.draft import Draft, drafts_of
+from placerec.lm.mutable import MutableModel, mutable_models
 from placerec.lm.score import (
     Contexts,
     Ngrams,
@@ -55,7 +55,7 @@ def walked(model: BackoffModel, words: Sequence[str], kind: type[np.floating]) -
     """log10 p of the last word, and the length of the n-gram that answers: n-gram by n-gram, in the order of sums."""
     p, weights = {}, {}
     for n in range(1, model.order + 1):
-        columns = model.trie.texts(n), model.log10_ps[n - 1].tolist(), model.backoffs[n - 1].tolist()
+        columns = model.trie.texts(n), model.log10_probs[n - 1].tolist(), model.backoffs[n - 1].tolist()
         for text, log10_p, backoff in zip(*columns, strict=True):
             p[tuple(text.split())] = log10_p
             weights[tuple(text.split())] = 0.0 if np.isnan(backoff) else backoff
@@ -72,16 +72,16 @@ def walked(model: BackoffModel, words: Sequence[str], kind: type[np.floating]) -
     return found, len(ngram)
 
 
-def tables_of(model: BackoffModel) -> tuple[ScoreTables, Draft]:
-    """The model's tables in float32, and the draft that they are made of."""
-    (draft,) = drafts_of([model], ["<s>", "<unk>"])
-    return draft.tables(np.arange(len(draft.trie.vocabulary)), len(draft.trie.vocabulary)), draft
+def tables_of(model: BackoffModel) -> tuple[ScoreTables, MutableModel]:
+    """The model's tables in float32, and the mutable that they are made of."""
+    (mutable,) = mutable_models([model], ["<s>", "<unk>"])
+    return mutable.tables(np.arange(len(mutable.trie.vocabulary)), len(mutable.trie.vocabulary)), mutable
 
 
-def sequence_of(draft: Draft, sentences: list[list[str]]) -> TokenSequence:
+def sequence_of(mutable: MutableModel, sentences: list[list[str]]) -> TokenSequence:
     words = [["<s>", *sentence, "</s>"] for sentence in sentences]
     first = [place == 0 for sentence in words for place in range(len(sentence))]
-    ids = draft.trie.vocabulary.ids([word for sentence in words for word in sentence])
+    ids = mutable.trie.vocabulary.ids([word for sentence in words for word in sentence])
     return TokenSequence(ids, np.array(first, bool), ~np.array(first, bool))
 
 
@@ -116,9 +116,9 @@ def test_single_precision_sums_weights_first(
     (model,) = models_of(one[:1], [order], name, markers=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(score, "_MOST_CODES", limit)
-        tables, draft = tables_of(model)
+        tables, mutable = tables_of(model)
     sentences = [*others[0], ["a", "nothing", "b"]]
-    sequence = sequence_of(draft, sentences)
+    sequence = sequence_of(mutable, sentences)
     log10_p, answered = looked_up(tables, sequence)
     marked = [["<s>", *sentence, "</s>"] for sentence in sentences]
     expected = [walked(model, words[: t + 1], np.float32) for words in marked for t in range(len(words))]
@@ -145,8 +145,8 @@ def test_distributions_hold_every_word_in_a_place(
 
 def test_answers_are_the_lengths_of_what_is_listed() -> None:
     (model,) = models_of([[["a", "b"]]], [3], markers=True)
-    tables, draft = tables_of(model)
-    sequence = sequence_of(draft, [["a", "b", "d", "c"]])
+    tables, mutable = tables_of(model)
+    sequence = sequence_of(mutable, [["a", "b", "d", "c"]])
     sequence.ids[3] = -1
     log10_p, answered = looked_up(tables, sequence)
     assert answered.tolist() == [1, 2, 3, 0, 1, 1]
@@ -157,8 +157,8 @@ def test_answers_are_the_lengths_of_what_is_listed() -> None:
 
 def test_no_context_reaches_over_the_start_of_a_sequence() -> None:
     (model,) = models_of([[["a", "b"], ["b", "a"]]], [3], markers=True)
-    tables, draft = tables_of(model)
-    ids = draft.trie.vocabulary.ids(["a", "b", "a", "b"])
+    tables, mutable = tables_of(model)
+    ids = mutable.trie.vocabulary.ids(["a", "b", "a", "b"])
     log10_p, _ = looked_up(tables, TokenSequence(ids, np.array([True, False, True, False]), np.ones(4, bool)))
     assert log10_p[:2].tolist() == log10_p[2:].tolist()
     assert log10_p[0] == np.float32(model.log10_p("a"))
@@ -203,9 +203,9 @@ def test_words_that_only_one_model_lists_are_impossible_for_the_other() -> None:
 
 def test_joint_probabilities_of_recent_words() -> None:
     (model,) = models_of([[["a", "b", "c"], ["a", "c"]]], [3], markers=True)
-    tables, draft = tables_of(model)
-    index, sequence = draft.trie.vocabulary.index, sequence_of(draft, [["a", "b", "c"]])
-    silent = ~draft.event[sequence.ids]
+    tables, mutable = tables_of(model)
+    index, sequence = mutable.trie.vocabulary.index, sequence_of(mutable, [["a", "b", "c"]])
+    silent = ~mutable.predictable[sequence.ids]
     two = joint_log10_p(tables, sequence, 2, silent, start=index["<s>"], end=index["</s>"])
     end = model.log10_p("</s>")
     assert two[1] == pytest.approx(end)

@@ -5,7 +5,7 @@ import pytest
 
 from placerec.errors import LanguageModelError
 from placerec.lm import SMOOTHINGS, count_ngrams, estimate, smoothing
-from placerec.lm.checks import context_sums
+from placerec.lm.check import context_sums
 from placerec.lm.count_statistics import (
     counts_of_counts,
     good_turing_factors,

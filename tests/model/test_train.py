@@ -167,8 +167,8 @@ def test_minimum_counts_drop_rare_ngrams(tmp_path: Path) -> None:
     counts = count_ngrams(text, 3, vocabulary=("a", "b", "c"), markers=False)
     model = estimate_place(counts, ModelOptions(3, min_count=parse_min_count("srilm")))
     all_kept = estimate_place(counts, ModelOptions(3))
-    assert [len(p) for p in model.log10_ps] == [6, 3, 1]
-    assert [len(p) for p in all_kept.log10_ps] == [6, 3, 2]
+    assert [len(p) for p in model.log10_probs] == [6, 3, 1]
+    assert [len(p) for p in all_kept.log10_probs] == [6, 3, 2]
 
 
 def test_the_minimum_counts_of_srilm() -> None:

@@ -79,9 +79,9 @@ def test_what_is_refused_and_what_is_warned_of(run: Run) -> None:
     assert run("-ppl t") == (1, "", "need at least an -lm file specified\n")
 
 
-def p(*log10_ps: float | np.float32, of: int = 1) -> str:
+def p(*log10_probs: float | np.float32, of: int = 1) -> str:
     """The probability, or perplexity (of so many words), of log probabilities that are kept in single precision."""
-    return f"{10 ** (sum(float(np.float32(value)) for value in log10_ps) / of):.7g}"
+    return f"{10 ** (sum(float(np.float32(value)) for value in log10_probs) / of):.7g}"
 
 
 def test_words_by_hand(run: Run) -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.lm.arpa import row_blocks
-from placerec.lm.draft import Draft
+from placerec.lm.mutable import MutableModel
 from placerec.srilm import arpa_reader
 from placerec.srilm.arpa import read_model
 from placerec.srilm.arpa_reader import log_value
@@ -24,10 +24,10 @@ HEADER = "\\data\\\nngram 1=2\nngram 2=1\n"
 GOOD = HEADER + "\\1-grams:\n-1\ta\t-0.5\n-2\tb\n\\2-grams:\n-0.1\ta b\n\\end\\\n"
 
 
-def format_draft(draft: Draft) -> str:
+def format_draft(mutable: MutableModel) -> str:
     """A model's text, with whatever it lists."""
-    columns = draft.log10_p, draft.backoff, draft.node
-    return b"".join(row_blocks(draft.trie, *columns, stored=draft.stored, encoding="latin-1")).decode("latin-1")
+    columns = mutable.log10_p, mutable.backoff, mutable.is_context
+    return b"".join(row_blocks(mutable.trie, *columns, stored=mutable.stored, encoding="latin-1")).decode("latin-1")
 
 
 def read(
@@ -38,19 +38,19 @@ def read(
     debug: int = 0,
     words: WordList | None = None,
     limited: bool = False,
-) -> tuple[Draft, ContextTimes, list[str]]:
+) -> tuple[MutableModel, ContextTimes, list[str]]:
     """Read a model from a file `m`; also what was said, without the file's name."""
     data = text if isinstance(text, bytes) else text.encode("latin-1")
     (folder / "m").write_bytes(data)
     said = BytesIO()
     name = str(folder / "m")
     try:
-        draft, times = read_model(
+        mutable, times = read_model(
             name, words or WordList(), Streams(BytesIO(), BytesIO(), said), order=order, debug=debug, limited=limited
         )
     except SrilmError as error:
         raise SrilmError((said.getvalue().decode("latin-1") + str(error)).replace(name, "m")) from error
-    return draft, times, said.getvalue().decode("latin-1").replace(name, "m").splitlines()
+    return mutable, times, said.getvalue().decode("latin-1").replace(name, "m").splitlines()
 
 
 @pytest.mark.parametrize(
@@ -95,9 +95,9 @@ def test_warnings_do_not(old: str, new: str, message: str, tmp_path: Path) -> No
 
 
 def test_what_is_ordinary_is_read_in_silence(tmp_path: Path) -> None:
-    draft, _, said = read(GOOD, tmp_path)
+    mutable, _, said = read(GOOD, tmp_path)
     assert not said
-    assert format_draft(draft) == (
+    assert format_draft(mutable) == (
         "\n\\data\\\nngram 1=2\nngram 2=1\nngram 3=0\n\n\\1-grams:\n-1\ta\t-0.5\n-2\tb\n\n\\2-grams:\n-0.1\ta b\n\n"
         "\\3-grams:\n\n\\end\\\n"
     )
@@ -112,7 +112,7 @@ def test_what_is_ordinary_is_read_in_silence(tmp_path: Path) -> None:
     )[:6]:
         again, _, said = read(odd, tmp_path)
         assert not said
-        assert format_draft(again) == format_draft(draft)
+        assert format_draft(again) == format_draft(mutable)
 
 
 def test_what_is_odd_is_written_as_it_was_read(tmp_path: Path) -> None:
@@ -122,9 +122,9 @@ def test_what_is_odd_is_written_as_it_was_read(tmp_path: Path) -> None:
     assert format_draft(read(lines, tmp_path)[0]) == lines
     # With a context of three words, of which no shorter n-gram is listed.
     lines = "\\data\\\nngram 3=1\nngram 4=1\n\\3-grams:\n-1\tx y z\t-0.5\n\\4-grams:\n-2\tx y z a\n\\end\\\n"
-    draft, _, said = read(lines, tmp_path, order=4)
+    mutable, _, said = read(lines, tmp_path, order=4)
     assert said == ['m: line 5: warning: no bow for prefix of ngram "x y z"']
-    assert format_draft(draft).endswith("\n\\3-grams:\n\n\\4-grams:\n-2\tx y z a\n\n\\end\\\n")
+    assert format_draft(mutable).endswith("\n\\3-grams:\n\n\\4-grams:\n-2\tx y z a\n\n\\end\\\n")
 
 
 def test_numbers_as_srilm_reads_them() -> None:
@@ -135,38 +135,38 @@ def test_numbers_as_srilm_reads_them() -> None:
 
 
 def test_sections_above_the_order_are_not_looked_at(tmp_path: Path) -> None:
-    draft, _, said = read(GOOD.replace("-0.1\ta b", "rubbish"), tmp_path, order=1, debug=1)
+    mutable, _, said = read(GOOD.replace("-0.1\ta b", "rubbish"), tmp_path, order=1, debug=1)
     assert said == ["reading 2 1-grams", "skipping 1 2-grams"]
-    assert draft.order == 1
-    assert not draft.node[0].any()
+    assert mutable.order == 1
+    assert not mutable.is_context[0].any()
 
 
 def test_a_limited_vocabulary_leaves_n_grams_out(tmp_path: Path) -> None:
     words = WordList()
     words.add("a")
-    draft, _, said = read(GOOD, tmp_path, debug=1, words=words, limited=True)
+    mutable, _, said = read(GOOD, tmp_path, debug=1, words=words, limited=True)
     assert said == [
         "reading 2 1-grams", "discarded 1 OOV 1-grams", "reading 1 2-grams", "discarded 1 OOV 2-grams",
     ]  # fmt: skip
-    assert [int(mask.sum()) for mask in draft.stored] == [1, 0, 0]
+    assert [int(mask.sum()) for mask in mutable.stored] == [1, 0, 0]
 
 
 def test_of_duplicates_the_last_counts(tmp_path: Path) -> None:
-    draft, _, said = read(GOOD.replace("-0.1\ta b\n", "-0.1\ta b\n-0.2\ta b\n"), tmp_path)
+    mutable, _, said = read(GOOD.replace("-0.1\ta b\n", "-0.1\ta b\n-0.2\ta b\n"), tmp_path)
     assert said == ["m: line 10: warning: 2 2-grams read, expected 1"]
-    assert draft.log10_p[1][draft.stored[1]].tolist() == [np.float32(-0.2)]
+    assert mutable.log10_p[1][mutable.stored[1]].tolist() == [np.float32(-0.2)]
 
 
 def test_a_context_is_one_from_the_line_with_its_weight_on(tmp_path: Path) -> None:
     """`x a b` with a weight makes contexts of `a b` and `b`; n-grams of theirs that came before are lost."""
     text = "\\data\\\nngram 3=4\n\\3-grams:\n-1\ta b c\n-1\tx a b\t-0.5\n-1\ta b c\n-1\ta b d\n\\end\\\n"
-    draft, _, said = read(text.replace("ngram 3=4", "ngram 3=4\nngram 4=0"), tmp_path, order=4)
+    mutable, _, said = read(text.replace("ngram 3=4", "ngram 3=4\nngram 4=0"), tmp_path, order=4)
     prefix = "warning: no bow for prefix of ngram"
     assert said == [f'm: line 5: {prefix} "a b c"', f'm: line 6: {prefix} "x a b"']
-    assert draft.trie.texts(3)[int(np.flatnonzero(draft.stored[2])[0])] == "a b c"
-    assert int(draft.stored[2].sum()) == 2
-    assert [int(mask.sum()) for mask in draft.node] == [1, 1, 1, 0]
-    assert format_draft(draft).count("\n-1\ta b") == 2
+    assert mutable.trie.texts(3)[int(np.flatnonzero(mutable.stored[2])[0])] == "a b c"
+    assert int(mutable.stored[2].sum()) == 2
+    assert [int(mask.sum()) for mask in mutable.is_context] == [1, 1, 1, 0]
+    assert format_draft(mutable).count("\n-1\ta b") == 2
 
 
 numbers = st.sampled_from(["-1", "-0.25", "-99", "-3e-05", "-1.51078e-08", "-123456.7", "-0"])
@@ -199,7 +199,7 @@ def test_whole_blocks_are_read_as_line_by_line(tmp_path_factory: pytest.TempPath
     assert format_draft(quick) == format_draft(slow)
     for n in range(3):
         np.testing.assert_array_equal(quick.trie.keys[n], slow.trie.keys[n])
-        np.testing.assert_array_equal(quick.node[n], slow.node[n])
+        np.testing.assert_array_equal(quick.is_context[n], slow.is_context[n])
         np.testing.assert_array_equal(times.created[n], slow_times.created[n])
 
 
@@ -215,8 +215,8 @@ def test_the_size_of_blocks_changes_nothing(
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(arpa_reader, "_BLOCK", block)
             try:
-                draft, _, said = read(text, folder)
-                seen.append((format_draft(draft), said))
+                mutable, _, said = read(text, folder)
+                seen.append((format_draft(mutable), said))
             except SrilmError as error:
                 seen.append((str(error), []))
     assert seen[0] == seen[1]
@@ -292,14 +292,14 @@ def test_contexts_are_told_of_in_the_order_of_the_hash_tables(
     text = "\\data\\\nngram 1=41\nngram 2=0\nngram 3=0\n" + "".join(
         f"\\{n}-grams:\n{''.join(its)}" for n, its in lines.items()
     )
-    draft, times, _ = read(text + "\\end\\\n", tmp_path_factory.mktemp("models"))
+    mutable, times, _ = read(text + "\\end\\\n", tmp_path_factory.mktemp("models"))
     table = Table(4)
     for context in ordered:
         table.insert([word + 4 for word in reversed(context)])
-    order = message_order(draft.trie, times)
+    order = message_order(mutable.trie, times)
     for n in (1, 2):
-        rows = np.flatnonzero(draft.node[n - 1])
+        rows = np.flatnonzero(mutable.is_context[n - 1])
         walked = rows[np.argsort(order(n + 1, rows))]
-        texts = draft.trie.texts(n)
+        texts = mutable.trie.texts(n)
         found = [tuple(int(word[1:]) + 4 for word in reversed(texts[row].split())) for row in walked.tolist()]
         assert found == list(table.walk(n))

@@ -15,10 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from placerec.lm.mix_weights import best_mix
 from placerec.srilm.add_ppls import add_ppls
 from placerec.srilm.change_lm_vocab import change_lm_vocab, restricted
-from placerec.srilm.compute_best_mix import compute_best_mix, starting_weights
+from placerec.srilm.compute_best_mix import best_mix, compute_best_mix, starting_weights
 from placerec.srilm.run import TOOLS
 from placerec.srilm.streams import SrilmError, Streams
 from placerec.srilm.vocabulary import WordList

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from placerec.arrays import Singles
 from placerec.evaluation import evaluate
 from placerec.evaluation.metrics import change_latencies, right_frames
 from placerec.experiments.grid.splits import Fold
@@ -21,7 +20,8 @@ from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, lea
 from placerec.hohmm.decoder import warn_of_unlisted
 from placerec.hohmm.evidence import evidence_in
 from placerec.hohmm.posterior import posterior
-from placerec.lm import BackoffModel, NgramCounts, count_ngrams
+from placerec.lm import NgramCounts, count_ngrams
+from placerec.lm.arpa import as_printed
 from placerec.lm.backoff import unite_models
 from placerec.lm.trie import Trie
 from placerec.model import Corpus, ModelOptions, estimate_place, read_corpus
@@ -133,26 +133,13 @@ def _counts(corpus: Corpus, order: int) -> list[NgramCounts]:
 
 def _models(counts: Sequence[NgramCounts], smoothing: str, order: int) -> Emissions:
     options = ModelOptions(order=order, smoothing=smoothing)
-    return unite_models([_printed(estimate_place(up_to(one, order), options)) for one in counts])
+    return unite_models([as_printed(estimate_place(up_to(one, order), options)) for one in counts])
 
 
 def up_to(counts: NgramCounts, order: int) -> NgramCounts:
     """The counts of the orders up to `order` alone."""
     keys = counts.trie.keys[:order]
     return NgramCounts(Trie(counts.trie.vocabulary, keys), counts.counts[:order], counts.seen[:order])
-
-
-def _printed(model: BackoffModel) -> BackoffModel:
-    log10_ps, backoffs = (tuple(map(seven_digits, values)) for values in (model.log10_ps, model.backoffs))
-    return BackoffModel(model.trie, log10_ps, backoffs)
-
-
-def seven_digits(values: Singles) -> Singles:
-    """The numbers as they come back from an ARPA file, where they have seven significant digits."""
-    exact = values.astype(np.float64)
-    rounded = np.isfinite(exact) & (exact != 0)
-    unit = 10.0 ** (6 - np.floor(np.log10(np.abs(exact, where=rounded, out=np.ones_like(exact)))))
-    return np.where(rounded, np.rint(exact * unit) / unit, exact).astype(np.float32)
 
 
 def _transition(name: str, streams: _Streams, job: CellJob) -> Transition:

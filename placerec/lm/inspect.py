@@ -11,7 +11,7 @@ from placerec.errors import LanguageModelError
 from placerec.files import read_text
 from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.checks import context_sums, power_of_ten
+from placerec.lm.check import context_sums, power_of_ten
 from placerec.lm.markers import SENTENCE_START
 from placerec.lm.score import Contexts
 
@@ -40,13 +40,13 @@ def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5)
 
 def most_frequent(model: BackoffModel, n: int, top: int) -> list[dict[str, Any]]:
     """The `top` n-grams of order n by joint probability (that of the context times p of the last word)."""
-    joint = model.log10_ps[0].astype(np.float64)
+    joint = model.log10_probs[0].astype(np.float64)
     start = model.trie.vocabulary.index.get(SENTENCE_START)
     if start is not None:
         # <s> is never predicted: what follows it is reached with certainty at the start of a sentence.
         joint[start] = 0.0 if n > 1 else -np.inf
     for k in range(2, n + 1):
-        joint = joint[model.trie.prefix(k)] + model.log10_ps[k - 1]
+        joint = joint[model.trie.prefix(k)] + model.log10_probs[k - 1]
     first = np.argsort(-joint, kind="stable")[:top]
     texts = model.trie.texts(n) if len(first) else []
     return [{"ngram": texts[row], "p": _finite(10 ** float(joint[row]))} for row in first.tolist()]

@@ -18,30 +18,30 @@ from placerec.lm.trie import Trie, Vocabulary, closed_trie, per_context
 
 
 @dataclass
-class Draft:
+class MutableModel:
     """A back-off model while it changes; every array lies beside the rows of `trie`, which lists every ending.
 
-    `event` (V,): words that can be predicted; `names` (V,): how many names a word has (aliases). `stored`: has a log
-    probability of its own, `log10_p`. `node`: is a context of the model, with the weight `backoff`. `base` + `weight`:
-    the log probability by back-off, `base` of the longest stored ending and `weight` the backoff weights paid on the
-    way, summed from short contexts to long.
+    `predictable` (V,): words that get a probability; `alias_counts` (V,): how many names a word has. `stored`: has a
+    log probability of its own, `log10_p`. `is_context`: is a context of the model, with the weight `backoff`. `base` +
+    `weight`: the log probability by back-off, `base` of the longest stored ending and `weight` the backoff weights paid
+    on the way, summed from short contexts to long.
     """
 
     trie: Trie
-    event: Mask
-    names: Ints = field(default_factory=lambda: np.ones(0, np.int64))
+    predictable: Mask
+    alias_counts: Ints = field(default_factory=lambda: np.ones(0, np.int64))
     stored: list[Mask] = field(default_factory=list)
     log10_p: list[Singles] = field(default_factory=list)
-    node: list[Mask] = field(default_factory=list)
+    is_context: list[Mask] = field(default_factory=list)
     backoff: list[Singles] = field(default_factory=list)
     base: list[Singles] = field(default_factory=list)
     weight: list[Singles] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        if not len(self.names):
-            self.names = np.ones(len(self.event), np.int64)
+        if not len(self.alias_counts):
+            self.alias_counts = np.ones(len(self.predictable), np.int64)
         for keys in self.trie.keys:
-            for mask in (self.stored, self.node):
+            for mask in (self.stored, self.is_context):
                 mask.append(np.zeros(len(keys), bool))
             for column in (self.log10_p, self.base):
                 column.append(np.full(len(keys), -np.inf, np.float32))
@@ -62,7 +62,7 @@ class Draft:
             self.base[0] = self.log10_p[0]
             return
         stored, shorter, context = self.stored[n - 1], self.trie.suffixes[n - 1], self.trie.prefix(n)
-        paid = np.where(self.node[n - 2], self.backoff[n - 2], np.float32(0))[context]
+        paid = np.where(self.is_context[n - 2], self.backoff[n - 2], np.float32(0))[context]
         self.base[n - 1] = np.where(stored, self.log10_p[n - 1], self.base[n - 2][shorter])
         self.weight[n - 1] = np.where(stored, np.float32(0), self.weight[n - 2][shorter] + paid)
 
@@ -71,21 +71,21 @@ class Draft:
         for n in range(1, self.order + 1):
             self.refresh(n)
 
-    def add_nodes(self, n: int, rows: Ints) -> None:
+    def add_contexts(self, n: int, rows: Ints) -> None:
         """Make rows of order n contexts; a context's ending is one too."""
         for k in range(n, 0, -1):
-            self.node[k - 1][rows] = True
+            self.is_context[k - 1][rows] = True
             if k > 1:
-                shorter = np.zeros(len(self.node[k - 2]), bool)
+                shorter = np.zeros(len(self.is_context[k - 2]), bool)
                 shorter[self.trie.suffixes[k - 1][rows]] = True
                 rows = np.flatnonzero(shorter)
 
     def tables(self, numbers: Ints, size: int) -> ScoreTables:
         """The tables that give words their probability: words are `numbers` (V,) there, below `size`."""
         orders = [
-            [Ngrams(numbers[self.trie.matrix(n)], log10_p, backoff, node, stored)]
-            for n, (log10_p, backoff, node, stored) in enumerate(
-                zip(self.log10_p, self.backoff, self.node, self.stored, strict=True), start=1
+            [Ngrams(numbers[self.trie.matrix(n)], log10_p, backoff, is_context, stored)]
+            for n, (log10_p, backoff, is_context, stored) in enumerate(
+                zip(self.log10_p, self.backoff, self.is_context, self.stored, strict=True), start=1
             )
         ]
         return build_tables(size, orders)
@@ -93,8 +93,8 @@ class Draft:
     def model(self) -> BackoffModel:
         """The model without the rows that hold nothing; the prefixes of what is stored must be stored."""
         backoffs = [
-            np.where(node, backoff, np.float32(np.nan)).astype(np.float32)[stored]
-            for node, backoff, stored in zip(self.node, self.backoff, self.stored, strict=True)
+            np.where(is_context, backoff, np.float32(np.nan)).astype(np.float32)[stored]
+            for is_context, backoff, stored in zip(self.is_context, self.backoff, self.stored, strict=True)
         ]
         return BackoffModel(
             self.trie.keep(self.stored),
@@ -103,102 +103,106 @@ class Draft:
         )
 
 
-def drafts_of(models: Sequence[BackoffModel], non_events: Sequence[str], words: Sequence[str] = ()) -> list[Draft]:
-    """Drafts of models over one trie, that of all their n-grams; `words` are added to the vocabulary."""
+def mutable_models(
+    models: Sequence[BackoffModel], non_events: Sequence[str], words: Sequence[str] = ()
+) -> list[MutableModel]:
+    """Mutable forms of models over one trie, that of all their n-grams; `words` are added to the vocabulary."""
     vocabulary = Vocabulary.of([word for model in models for word in model.words] + list(words))
-    return unite([_draft_of(model) for model in models], vocabulary, ~vocabulary.mask(non_events))
+    return unite([_mutable_model(model) for model in models], vocabulary, ~vocabulary.mask(non_events))
 
 
-def _draft_of(model: BackoffModel) -> Draft:
+def _mutable_model(model: BackoffModel) -> MutableModel:
     trie = model.trie.with_endings()
-    draft = Draft(trie, np.ones(len(trie.vocabulary), bool))
+    mutable = MutableModel(trie, np.ones(len(trie.vocabulary), bool))
     rows = np.arange(len(trie.vocabulary))
     for n in range(1, model.order + 1):
         rows = trie.find(n, rows[model.trie.prefix(n)], model.trie.word(n)) if n > 1 else rows
-        draft.stored[n - 1][rows] = True
-        draft.log10_p[n - 1][rows] = model.log10_ps[n - 1]
+        mutable.stored[n - 1][rows] = True
+        mutable.log10_p[n - 1][rows] = model.log10_probs[n - 1]
         backoff = model.backoffs[n - 1]
-        is_node = ~np.isnan(backoff)
-        draft.backoff[n - 1][rows[is_node]] = backoff[is_node]
-        draft.add_nodes(n, rows[is_node])
-    draft.refresh_all()
-    return draft
+        is_context = ~np.isnan(backoff)
+        mutable.backoff[n - 1][rows[is_context]] = backoff[is_context]
+        mutable.add_contexts(n, rows[is_context])
+    mutable.refresh_all()
+    return mutable
 
 
-def unite(drafts: Sequence[Draft], vocabulary: Vocabulary, event: Mask, names: Ints | None = None) -> list[Draft]:
+def unite(
+    models: Sequence[MutableModel], vocabulary: Vocabulary, predictable: Mask, alias_counts: Ints | None = None
+) -> list[MutableModel]:
     """The same models over one trie, that of all their rows and of `vocabulary`, which must list all their words.
 
-    `event` and `names` (V,) as in Draft.
+    `predictable` and `alias_counts` (V,) as in MutableModel.
     """
-    order = max(draft.order for draft in drafts)
+    order = max(model.order for model in models)
     groups = []
-    for draft in drafts:
-        renumbered = vocabulary.ids(draft.trie.vocabulary.words)
-        groups += [renumbered[draft.trie.matrix(n)] for n in range(1, draft.order + 1)]
+    for model in models:
+        renumbered = vocabulary.ids(model.trie.vocabulary.words)
+        groups += [renumbered[model.trie.matrix(n)] for n in range(1, model.order + 1)]
     trie, rows = closed_trie(vocabulary, order, groups)
     united, place = [], iter(rows)
-    for draft in drafts:
-        wider = Draft(trie, event) if names is None else Draft(trie, event, names)
-        for n in range(1, draft.order + 1):
+    for model in models:
+        wider = MutableModel(trie, predictable, np.zeros(0, np.int64) if alias_counts is None else alias_counts)
+        for n in range(1, model.order + 1):
             row = next(place)[-1]
-            wider.stored[n - 1][row] = draft.stored[n - 1]
-            wider.log10_p[n - 1][row] = draft.log10_p[n - 1]
-            wider.node[n - 1][row] = draft.node[n - 1]
-            wider.backoff[n - 1][row] = draft.backoff[n - 1]
+            wider.stored[n - 1][row] = model.stored[n - 1]
+            wider.log10_p[n - 1][row] = model.log10_p[n - 1]
+            wider.is_context[n - 1][row] = model.is_context[n - 1]
+            wider.backoff[n - 1][row] = model.backoff[n - 1]
         wider.refresh_all()
         united.append(wider)
     return united
 
 
-def weigh_contexts(draft: Draft, n: int, trace: Trace, *, minimum: float | None = None) -> None:
+def weigh_contexts(model: MutableModel, n: int, trace: Trace, *, minimum: float | None = None) -> None:
     """Section 6.5: the backoff weights of all contexts of length n-1, from the stored n-grams of order n.
 
     `minimum`: the least mass that backing off must leave (`-minbackoff`, section 11.1).
     """
-    rows = np.flatnonzero(draft.stored[n - 1])
+    rows = np.flatnonzero(model.stored[n - 1])
     if n == 1:
-        left = float(1 - p_of(draft.log10_p[0][rows]).sum())
+        left = float(1 - p_of(model.log10_p[0][rows]).sum())
         if minimum is not None and 0 - left > EPSILON:
-            left = _scale_unigrams(draft, rows, left, trace)
+            left = _scale_unigrams(model, rows, left, trace)
         left = 0.0 if abs(left) < EPSILON else left
         if left < 0:
             trace.overfull_contexts(1, np.zeros(1, np.int64), np.array([left]))
             return
         trace.weights(1, np.zeros(1, np.int64), np.array([left]), np.ones(1), log10(np.array([left])))
-        spread_unigram_mass(draft, left, trace)
+        spread_unigram_mass(model, left, trace)
         return
-    contexts = np.flatnonzero(draft.node[n - 2])
-    group = np.searchsorted(contexts, draft.trie.prefix(n)[rows])
-    num, den = context_masses(draft, n, contexts, rows, group)
+    contexts = np.flatnonzero(model.is_context[n - 2])
+    group = np.searchsorted(contexts, model.trie.prefix(n)[rows])
+    num, den = context_masses(model, n, contexts, rows, group)
     if minimum is not None:
-        num = _keep_minimum(draft, n, rows, group, contexts, num, minimum, trace)
+        num = _keep_minimum(model, n, rows, group, contexts, num, minimum, trace)
     num[np.abs(num) < EPSILON] = 0
     den[np.abs(den) < EPSILON] = 0
-    num, den, overfull = settle_masses(draft, n, rows, group, contexts, num, den, trace)
+    num, den, overfull = settle_masses(model, n, rows, group, contexts, num, den, trace)
     with np.errstate(divide="ignore", invalid="ignore"):
         weight = np.where((num < EPSILON) & (den < EPSILON), 0, np.log10(num) - np.log10(den)).astype(np.float32)
     weight[overfull] = -np.inf
-    draft.backoff[n - 2][contexts] = weight
+    model.backoff[n - 2][contexts] = weight
     trace.weights(n, contexts, num, den, weight)
 
 
-def context_masses(draft: Draft, n: int, contexts: Ints, rows: Ints, group: Ints) -> tuple[Floats, Floats]:
+def context_masses(model: MutableModel, n: int, contexts: Ints, rows: Ints, group: Ints) -> tuple[Floats, Floats]:
     """What the n-grams `rows` leave, per context: 1 - sum p, and 1 - sum p by the shorter context, float64 (C,)."""
-    shorter = draft.backed_off(n - 1)[draft.trie.suffixes[n - 1][rows]]
-    num = 1 - per_context(group, len(contexts), p_of(draft.log10_p[n - 1][rows]))
+    shorter = model.backed_off(n - 1)[model.trie.suffixes[n - 1][rows]]
+    num = 1 - per_context(group, len(contexts), p_of(model.log10_p[n - 1][rows]))
     den = 1 - per_context(group, len(contexts), p_of(shorter))
     return num, den
 
 
 def settle_masses(
-    draft: Draft, n: int, rows: Ints, group: Ints, contexts: Ints, num: Floats, den: Floats, trace: Trace
+    model: MutableModel, n: int, rows: Ints, group: Ints, contexts: Ints, num: Floats, den: Floats, trace: Trace
 ) -> tuple[Floats, Floats, Mask]:
     """Steps 2 to 4 of section 6.5: contexts that have seen every word are scaled, and what cannot be is reported."""
     stuck = (den < EPSILON) & (num > EPSILON)
     if stuck.any():
         trace.full_contexts(n, contexts[stuck])
         scale = np.where(stuck, -np.log10(1 - np.where(stuck, num, 0)), 0).astype(np.float32)
-        draft.log10_p[n - 1][rows] += scale[group]
+        model.log10_p[n - 1][rows] += scale[group]
     num, den = np.where(stuck, 0, num), np.where(stuck, 0, den)
     overfull = num < 0
     if overfull.any():
@@ -208,7 +212,7 @@ def settle_masses(
 
 
 def _keep_minimum(
-    draft: Draft,
+    model: MutableModel,
     n: int,
     rows: Ints,
     group: Ints,
@@ -221,56 +225,56 @@ def _keep_minimum(
     if scarce.any():
         trace.scarce_contexts(n, contexts[scarce], num[scarce], minimum)
         scale = np.where(scarce, np.log10(1 - minimum) - np.log10(1 - np.where(scarce, num, 0)), 0).astype(np.float32)
-        draft.log10_p[n - 1][rows] += scale[group]
+        model.log10_p[n - 1][rows] += scale[group]
     return np.where(scarce, minimum, num)
 
 
-def _scale_unigrams(draft: Draft, rows: Ints, left: float, trace: Trace) -> float:
+def _scale_unigrams(model: MutableModel, rows: Ints, left: float, trace: Trace) -> float:
     trace.scarce_contexts(1, np.zeros(1, np.int64), np.array([left]), 0.0)
-    draft.log10_p[0][rows] += np.float32(-np.log10(1 - left))
+    model.log10_p[0][rows] += np.float32(-np.log10(1 - left))
     return 0.0
 
 
-def spread_unigram_mass(draft: Draft, mass: float, trace: Trace) -> None:
+def spread_unigram_mass(model: MutableModel, mass: float, trace: Trace) -> None:
     """Section 6.6: what the seen unigrams leave goes to the words without one, or to all if there are none."""
-    draft.stored[0] |= draft.event
-    zero = draft.event & np.isneginf(draft.log10_p[0])
+    model.stored[0] |= model.predictable
+    zero = model.predictable & np.isneginf(model.log10_p[0])
     if zero.any():
         # SRILM shares by names: a word with an alias takes one share and leaves the other.
-        shares = int(draft.names[zero].sum())
+        shares = int(model.alias_counts[zero].sum())
         trace.unigram_mass(mass, shares, everyone=False)
         if mass > 0:
-            draft.log10_p[0][zero] = np.float32(np.log10(mass / shares))
+            model.log10_p[0][zero] = np.float32(np.log10(mass / shares))
         return
-    size = int(draft.event.sum())
+    size = int(model.predictable.sum())
     if mass > 0:
         trace.unigram_mass(mass, size, everyone=True)
-    draft.log10_p[0][draft.event] = log10(p_of(draft.log10_p[0][draft.event]) + mass / max(1, size))
+    model.log10_p[0][model.predictable] = log10(p_of(model.log10_p[0][model.predictable]) + mass / max(1, size))
 
 
-def insert_prefixes(draft: Draft, trace: Trace) -> None:
+def insert_prefixes(model: MutableModel, trace: Trace) -> None:
     """Section 6.7: a context needs a line for its weight; those that have none get their backed-off value."""
-    trie = draft.trie
+    trie = model.trie
     missing: list[Ints] = [np.zeros(0, np.int64)] * trie.order
     needed = np.zeros(0, np.int64)
     for n in range(trie.order - 1, 0, -1):
-        lacking = draft.node[n - 1] & ~draft.stored[n - 1]
-        lacking[needed[~draft.stored[n - 1][needed]]] = True
+        lacking = model.is_context[n - 1] & ~model.stored[n - 1]
+        lacking[needed[~model.stored[n - 1][needed]]] = True
         missing[n - 1] = np.flatnonzero(lacking)
         needed = np.unique(trie.prefix(n)[missing[n - 1]]) if n > 1 else needed
     for n, rows in enumerate(missing, start=1):
-        draft.refresh(n)
-        draft.log10_p[n - 1][rows] = draft.backed_off(n)[rows]
-        draft.stored[n - 1][rows] = True
+        model.refresh(n)
+        model.log10_p[n - 1][rows] = model.backed_off(n)[rows]
+        model.stored[n - 1][rows] = True
         if n > 1:
-            draft.add_nodes(n - 1, np.unique(trie.prefix(n)[rows]))
-        draft.refresh(n)
+            model.add_contexts(n - 1, np.unique(trie.prefix(n)[rows]))
+        model.refresh(n)
         if len(rows):
             trace.inserted(n, rows)
 
 
-def reweigh(draft: Draft, trace: Trace, *, minimum: float | None = None) -> None:
+def reweigh(model: MutableModel, trace: Trace, *, minimum: float | None = None) -> None:
     """Recompute all backoff weights, and spread what the unigrams leave (`-renorm`, section 11.1)."""
-    for n in range(1, draft.order + 1):
-        weigh_contexts(draft, n, trace, minimum=minimum)
-        draft.refresh(n)
+    for n in range(1, model.order + 1):
+        weigh_contexts(model, n, trace, minimum=minimum)
+        model.refresh(n)
