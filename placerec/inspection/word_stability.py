@@ -1,21 +1,80 @@
-"""How stable the words are, as text and as a picture."""
+"""How stable words are: the share of frames that get another word when a camera's small faults are added to them."""
 
-from collections.abc import Iterable
-from itertools import groupby
+import logging
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain, groupby
 from pathlib import Path
+from typing import Any, cast
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from placerec.arrays import Ints, Mask, Singles
+from placerec.errors import VisionError
 from placerec.evaluation.summary import percent
 from placerec.figures.canvas import figure_file, picture_file
-from placerec.frames import SourceOptions, find_sequences
+from placerec.frames import Frame, Sequence, SourceOptions, all_images, find_sequences
+from placerec.frames.sequence import Gray
 from placerec.jobs import Progress
 from placerec.vision import Dictionary
-from placerec.vision.stability import Stability, word_changes
+from placerec.vision.spec import DescriptorSpec, check_describes_images, descriptor
+
+log = logging.getLogger(__name__)
+
+# Frames whose descriptors are held at once: each has one a change.
+_CHUNK = 256
 
 # Okabe and Ito's vermilion and sky blue.
 _FAR, _NEAR = "#D55E00", "#56B4E9"
 _NEXT = "the next frame, for comparison"
+
+
+@dataclass(frozen=True)
+class Change:
+    """One way to spoil a picture: `apply(gray, spec, rng)` gives a picture of the same or of the fitted size."""
+
+    kind: str
+    amount: str
+    apply: Callable[[Gray, DescriptorSpec, np.random.Generator], Gray]
+
+
+@dataclass(frozen=True)
+class ChangeResult:
+    """How many frames got another word by a change, and how many of these the word of a unit next to it (of 8)."""
+
+    kind: str
+    amount: str
+    changed: int
+    neighbour: int
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The result for every change, over `frames` frames.
+
+    `steps`, `step_changed`, `step_neighbour`: pairs of consecutive frames, and the same counts for them: how much
+    words change anyway.
+    """
+
+    frames: int
+    results: tuple[ChangeResult, ...]
+    steps: int
+    step_changed: int
+    step_neighbour: int
+
+    def to_json(self) -> dict[str, object]:
+        """The object that `stability --json` prints; shares are of 1, None where there are no two frames in a row."""
+        return {
+            "frames": self.frames,
+            "changes": [
+                {"kind": r.kind, "amount": r.amount, **_shares(r.changed, r.neighbour, self.frames)}
+                for r in self.results
+            ],
+            "next_frame": {"steps": self.steps, **_shares(self.step_changed, self.step_neighbour, self.steps)},
+        }
 
 
 def stability(
@@ -38,6 +97,134 @@ def stability(
         if picture is not None:
             plot_stability(found, picture)
     return found
+
+
+def word_changes(
+    sequences: Iterable[Sequence], dictionary: Dictionary, *, seed: int = 0, progress: Progress | None = None
+) -> Stability:
+    """The words of all frames as they are and after each of CHANGES, compared.
+
+    The picture is changed as the file holds it, in grey and before it is fitted, and stays of 8 bits where it was.
+    Noise is drawn by seed and number of the frame. An image that cannot be read is skipped and named in a warning;
+    VisionError if none can be read, or if the dictionary is of descriptors that were computed elsewhere.
+    """
+    check_describes_images(dictionary.spec)
+    sequences = list(sequences)
+    total = sum(len(sequence.frames) for sequence in sequences)
+    words: list[Ints] = []
+    kept: list[int] = []
+    rows: list[Singles] = []
+    for number, (frame, image) in enumerate(chain.from_iterable(map(all_images, sequences))):
+        described = _described(frame, image, dictionary.spec, np.random.Generator(np.random.PCG64([seed, number])))
+        if described is not None:
+            rows.append(described)
+            kept.append(number)
+        if rows and (len(rows) == _CHUNK or number == total - 1):
+            words.append(dictionary.words(np.concatenate(rows))[0].reshape(len(rows), -1))
+            rows = []
+        if progress is not None:
+            progress(number + 1, total)
+    if not kept:
+        raise VisionError(f"none of the {total} images can be read; name a folder with images")
+    starts = np.cumsum([len(sequence.frames) for sequence in sequences])
+    sequence_of = np.searchsorted(starts, kept, side="right")
+    return _compared(np.concatenate(words), sequence_of[1:] == sequence_of[:-1], dictionary.training.size)
+
+
+def _compared(words: Ints, follows: Mask, size: int) -> Stability:
+    """words (n, 1 + changes), the unchanged first; follows (n - 1,): whether the next row is of the same sequence."""
+    results = []
+    for column, change in enumerate(CHANGES, start=1):
+        results.append(ChangeResult(change.kind, change.amount, *_count(words[:, 0], words[:, column], size)))
+    step = _count(words[:-1, 0][follows], words[1:, 0][follows], size)
+    return Stability(len(words), tuple(results), int(follows.sum()), *step)
+
+
+def _count(before: Ints, after: Ints, size: int) -> tuple[int, int]:
+    """How many units differ, and how many of these are next to each other on the map, corners included."""
+    apart = np.maximum(np.abs(before // size - after // size), np.abs(before % size - after % size))
+    return int((apart > 0).sum()), int((apart == 1).sum())
+
+
+def _shares(changed: int, neighbour: int, of: int) -> dict[str, float | None]:
+    return {"changed": changed / of if of else None, "to_neighbour": neighbour / of if of else None}
+
+
+def _described(frame: Frame, gray: Gray | str, spec: DescriptorSpec, rng: np.random.Generator) -> Singles | None:
+    """Descriptors of a frame as it is and after each change, (1 + changes, d); None if it cannot be used."""
+    if isinstance(gray, str):
+        log.warning("%s; the frame is skipped", gray)
+        return None
+    try:
+        return np.stack([descriptor(gray, spec), *(descriptor(each, spec) for each in _changed(gray, spec, rng))])
+    except VisionError as error:
+        log.warning("%s: frame %s: %s; the frame is skipped", frame.path, frame.name, error)
+    return None
+
+
+def _changed(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator) -> Iterator[Gray]:
+    for change in CHANGES:
+        yield change.apply(gray, spec, rng)
+
+
+def _like(values: NDArray[Any], gray: Gray) -> Gray:
+    """Grey values cut to 0..255, and to whole numbers where the picture's are."""
+    values = values.clip(0, 255)
+    return cast(Gray, np.rint(values).astype(np.uint8) if gray.dtype == np.uint8 else values.astype(np.float32))
+
+
+def _jpeg(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, quality: int) -> Gray:
+    whole = np.rint(gray).astype(np.uint8)
+    _, data = cv2.imencode(".jpg", whole, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return cast(Gray, cv2.imdecode(data, cv2.IMREAD_GRAYSCALE))
+
+
+def _noise(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, sigma: float) -> Gray:
+    return _like(gray + sigma * rng.standard_normal(gray.shape), gray)
+
+
+def _brightness(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, factor: float) -> Gray:
+    return _like(gray * np.float64(factor), gray)
+
+
+def _blur(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, sigma: float) -> Gray:
+    return cast(Gray, cv2.GaussianBlur(gray, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE))
+
+
+def _shift(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, right: int, down: int) -> Gray:
+    # What comes in from outside repeats the edge.
+    height, width = gray.shape
+    rows = np.clip(np.arange(height) - down, 0, height - 1)
+    columns = np.clip(np.arange(width) - right, 0, width - 1)
+    return gray[np.ix_(rows, columns)]
+
+
+def _resized(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, interpolation: int) -> Gray:
+    """The picture fitted to its square as `fit_image` does it, but by another filter."""
+    height, width = gray.shape
+    side = spec.image_size
+    if spec.fit == "squash":
+        height, width = side, side
+    else:
+        scale = max(side / height, side / width)
+        height, width = int(scale * height + 0.5), int(scale * width + 0.5)
+    top, left = (height - side) // 2, (width - side) // 2
+    whole = cv2.resize(gray, (width, height), interpolation=interpolation)
+    return _like(whole[top : top + side, left : left + side], gray)
+
+
+CHANGES = (
+    *(Change("JPEG", f"quality {q}", partial(_jpeg, quality=q)) for q in (90, 70, 50, 30)),
+    *(Change("noise", f"sigma {s}", partial(_noise, sigma=s)) for s in (2, 5, 10)),
+    *(Change("brightness", f"{p:+d} %", partial(_brightness, factor=1 + p / 100)) for p in (-30, -10, 10, 30)),
+    *(Change("blur", f"sigma {s}", partial(_blur, sigma=s)) for s in (1, 2)),
+    Change("shift by 1 pixel", "left", partial(_shift, right=-1, down=0)),
+    Change("shift by 1 pixel", "right", partial(_shift, right=1, down=0)),
+    Change("shift by 1 pixel", "up", partial(_shift, right=0, down=-1)),
+    Change("shift by 1 pixel", "down", partial(_shift, right=0, down=1)),
+    Change("resize filter", "nearest", partial(_resized, interpolation=cv2.INTER_NEAREST)),
+    Change("resize filter", "bicubic", partial(_resized, interpolation=cv2.INTER_CUBIC)),
+)
 
 
 def format_stability(found: Stability) -> str:

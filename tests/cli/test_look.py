@@ -7,8 +7,8 @@ import pytest
 from helpers.small_world import write_images
 from helpers.typed_commands import placerec
 
+from placerec.inspection.word_stability import CHANGES
 from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
-from placerec.vision.stability import CHANGES
 
 
 @pytest.fixture(scope="module")

@@ -15,10 +15,9 @@ from placerec.frames.sequence import Gray
 from placerec.frames.table import FrameTable
 from placerec.inspection import show_frame, show_words, stability, word_stability, words
 from placerec.inspection.word_sheet import draw_word_sheet
-from placerec.inspection.word_stability import format_stability, plot_stability
+from placerec.inspection.word_stability import ChangeResult, Stability, format_stability, plot_stability
 from placerec.inspection.words import WordTable
 from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
-from placerec.vision.stability import ChangeResult, Stability
 
 pytest.importorskip("matplotlib")
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from placerec.errors import VisionError
 from placerec.frames import Sequence, find_sequences, read_gray
 from placerec.frames.sequence import Gray
-from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, descriptor, fit_image, stability
-from placerec.vision.stability import CHANGES, Change, Stability, word_changes
+from placerec.inspection import word_stability
+from placerec.inspection.word_stability import CHANGES, Change, ChangeResult, Stability, word_changes
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, descriptor, fit_image
 
 SPEC = DescriptorSpec(image_size=16)
 World = tuple[list[Sequence], Dictionary]
@@ -71,7 +72,7 @@ def test_the_same_seed_gives_the_same_counts_in_pieces_of_any_size(
 ) -> None:
     whole = word_changes(*world)
     told: list[tuple[int, int]] = []
-    monkeypatch.setattr(stability, "_CHUNK", 3)
+    monkeypatch.setattr(word_stability, "_CHUNK", 3)
     assert word_changes(*world, progress=lambda *done: told.append(done)) == whole
     assert told == [(done, 20) for done in range(1, 21)]
 
@@ -92,7 +93,7 @@ def test_an_image_that_cannot_be_read_is_skipped_and_named(
 
 
 def test_json_has_shares() -> None:
-    found = Stability(4, (stability.ChangeResult("noise", "sigma 2", 2, 1),), 0, 0, 0)
+    found = Stability(4, (ChangeResult("noise", "sigma 2", 2, 1),), 0, 0, 0)
     assert found.to_json() == {
         "frames": 4,
         "changes": [{"kind": "noise", "amount": "sigma 2", "changed": 0.5, "to_neighbour": 0.25}],
@@ -151,7 +152,7 @@ def test_another_filter_keeps_the_way_of_fitting(fit: str) -> None:
     gray = picture(np.float32, 60, 90)
     spec = DescriptorSpec(image_size=20, fit=fit)
     rng = np.random.Generator(np.random.PCG64(0))
-    with_ours = stability._resized(gray, spec, rng, interpolation=cv2.INTER_AREA)
+    with_ours = word_stability._resized(gray, spec, rng, interpolation=cv2.INTER_AREA)
     np.testing.assert_allclose(with_ours, fit_image(gray, 20, fit), atol=1e-3)
     for name in ("nearest", "bicubic"):
         assert not np.array_equal(spoilt(gray, "resize filter", name, spec), with_ours)
