@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from placerec.lm.inspect import inspect_model
     from placerec.methods import decode, follow_live, load_decoder
     from placerec.model import Decoding, ModelOptions, calibrate, load_recognizer, train_lm, update
-    from placerec.vision import DescriptorSpec, Dictionary, describe, gist, train_dictionary
+    from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, gist, train_dictionary
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
 
