@@ -73,21 +73,39 @@ def backed_off(model: Model, word: str, history: Sequence[str]) -> float:
 
 
 def belief(words: Sequence[str], models: Sequence[Model], order: int, stay: float) -> list[list[float]]:
-    """The belief over places after every word: eq. 1 with fixed transitions, uniform at the start."""
+    """The belief over places after every word: eq. 1 with fixed transitions."""
     C = len(models)
     leave = (1 - stay) / (C - 1) if C > 1 else 0.0
+    matrix = [[stay if i == c else leave for c in range(C)] for i in range(C)]
+    histories = [words[max(0, t - order + 1) : t] for t in range(len(words))]
+    known = zip(words, histories, strict=True)
+    loglik = [[_log(backed_off(model, word, history)) for model in models] for word, history in known]
+    return filtered(loglik, [matrix] * len(words))[0]
+
+
+def filtered(
+    loglik: Sequence[Sequence[float]], matrices: Sequence[Sequence[Sequence[float]]]
+) -> tuple[list[list[float]], list[bool]]:
+    """The belief after every word, uniform at the start, and whether the word has a probability above 0 in any place.
+
+    `loglik`: of each word in each place. `matrices`: the transitions before each word, rows the place before; the first
+    is not used.
+    """
     beliefs: list[list[float]] = []
-    log_b = [-math.log(C)] * C
-    for t, word in enumerate(words):
-        if t > 0:
-            log_b = [_log_sum([b + _log(stay if i == c else leave) for i, b in enumerate(log_b)]) for c in range(C)]
-        history = words[max(0, t - order + 1) : t]
-        weighed = [b + _log(backed_off(model, word, history)) for b, model in zip(log_b, models, strict=True)]
-        total = _log_sum(weighed)
-        if total > -math.inf:
-            log_b = [value - total for value in weighed]
+    possible: list[bool] = []
+    for t, row in enumerate(loglik):
+        C = len(row)
+        if t == 0:
+            log_b = [-math.log(C)] * C
+        else:
+            log_b = [_log_sum([b + _log(matrices[t][i][c]) for i, b in enumerate(log_b)]) for c in range(C)]
+        joint = [b + value for b, value in zip(log_b, row, strict=True)]
+        total = _log_sum(joint)
+        possible.append(total > -math.inf)
+        if possible[-1]:
+            log_b = [value - total for value in joint]
         beliefs.append([math.exp(value) for value in log_b])
-    return beliefs
+    return beliefs, possible
 
 
 def _log(x: float) -> float:

@@ -9,7 +9,7 @@ from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import EvaluationError
 from placerec.evaluation.confidence import NewPlaces, Reliability, RiskCoverage, new_places, reliability, risk_coverage
 from placerec.frames.table import Labels
-from placerec.hohmm.beliefs import UNKNOWN, Beliefs
+from placerec.hohmm.beliefs import UNKNOWN_PLACE, Beliefs
 
 # A belief of 0 in the true place would make the mean infinite, and one frame would then hide all others.
 _SMALLEST_BELIEF = 1e-15
@@ -138,15 +138,15 @@ def evaluate(beliefs: Sequence[Beliefs]) -> Evaluation:
 def place_order(beliefs: Sequence[Beliefs]) -> tuple[str, ...]:
     """All places of several sequences: the columns in order of appearance, other labels by name, then `unknown`."""
     columns = dict.fromkeys(place for sequence in beliefs for place in sequence.places)
-    others = {place for sequence in beliefs for place in (*sequence.truth, *sequence.best)} - {"", UNKNOWN, *columns}
-    asked = any(s.unknown is not None or UNKNOWN in s.truth for s in beliefs)
-    return (*columns, *sorted(others), *([UNKNOWN] if asked else []))
+    others = {place for one in beliefs for place in (*one.truth, *one.best)} - {"", UNKNOWN_PLACE, *columns}
+    asked = any(s.unknown is not None or UNKNOWN_PLACE in s.truth for s in beliefs)
+    return (*columns, *sorted(others), *([UNKNOWN_PLACE] if asked else []))
 
 
 def right_frames(sequence: Beliefs) -> Mask:
     """The frames whose decided place is their label, or `unknown` where the label has no column, bool (n,)."""
     truth, best = np.array(sequence.truth, np.str_), np.array(sequence.best, np.str_)
-    right: Mask = (truth != "") & ((best == truth) | (_new_frames(sequence) & (best == UNKNOWN)))
+    right: Mask = (truth != "") & ((best == truth) | (_new_frames(sequence) & (best == UNKNOWN_PLACE)))
     return right
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from placerec.arrays import Floats
 from placerec.errors import OutputError, check_optional
 from placerec.files import whole_file
-from placerec.hohmm.beliefs import UNKNOWN
+from placerec.hohmm.beliefs import UNKNOWN_PLACE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,7 +96,7 @@ def place_colours(places: Sequence[str]) -> Floats:
     base = np.array([[(colour >> shift & 255) / 255 for shift in (16, 8, 0)] for colour in _PALETTE])
     index = np.arange(len(places))
     colours: Floats = base[index % len(base)] * 0.6 ** (index // len(base))[:, None]
-    colours[[place == UNKNOWN for place in places]] = _GREY
+    colours[[place == UNKNOWN_PLACE for place in places]] = _GREY
     return colours
 
 

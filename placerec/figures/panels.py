@@ -11,7 +11,7 @@ from placerec.evaluation.metrics import Evaluation, place_order, right_frames
 from placerec.evaluation.summary import percent, shorten
 from placerec.figures.canvas import BLACK, WHITE, letter_colour, place_colours
 from placerec.frames.table import Labels
-from placerec.hohmm.beliefs import UNKNOWN, Beliefs
+from placerec.hohmm.beliefs import UNKNOWN_PLACE, Beliefs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,7 +116,7 @@ def _shares(beliefs: Beliefs, drawn: Ints, places: Sequence[str]) -> tuple[Float
     if beliefs.unknown is None:
         return belief, Labels(beliefs.places).codes(places)
     unknown = beliefs.unknown[drawn, None]
-    return np.hstack([belief * (1 - unknown), unknown]), Labels((*beliefs.places, UNKNOWN)).codes(places)
+    return np.hstack([belief * (1 - unknown), unknown]), Labels((*beliefs.places, UNKNOWN_PLACE)).codes(places)
 
 
 def _stacked(belief: Floats, place: Ints) -> Ints:

@@ -22,7 +22,7 @@ from placerec.files import read_text, write_text
 from placerec.words import WordStream
 
 COLUMNS = ("frame", "time", "place", "word", "selected", "best")
-UNKNOWN = "unknown"
+UNKNOWN_PLACE = "unknown"
 
 # A file of rounded numbers may miss 1 by a little; a row that misses it by more is no distribution.
 _SUM_TOLERANCE = 1e-3
@@ -33,8 +33,8 @@ class Beliefs:
     """What was believed about every frame of one sequence, n frames, and each of C places.
 
     `stream`: the sequence, its words and true places. `selected` bool (n,): the frames that the filter took in.
-    `best`: the most probable place of each frame, or UNKNOWN. `belief` float64 (n, C), rows sum to 1: in each place,
-    given that it is one of them. `unknown` float64 (n,): that the place is none of them; None where nobody asked.
+    `best`: the most probable place of each frame, or UNKNOWN_PLACE. `belief` float64 (n, C), rows sum to 1: in each
+    place, given that it is one of them. `unknown` float64 (n,): that it is none of them; None where nobody asked.
     """
 
     stream: WordStream
@@ -54,14 +54,14 @@ class Beliefs:
         best: Ints | None = None,
         unknown: Floats | None = None,
     ) -> "Beliefs":
-        """The beliefs (n, C) about the frames of a stream; `best` is UNKNOWN where `unknown` (n,) is above 1/2.
+        """The beliefs (n, C) about the frames of a stream; `best` is UNKNOWN_PLACE where `unknown` (n,) is above 1/2.
 
         `selected` bool (n,): all frames if left out. `best` int64 (n,): a column each, the most probable if left out.
         """
         columns = belief.argmax(axis=1) if best is None else best
         names = [places[column] for column in columns.tolist()]
         if unknown is not None:
-            names = [UNKNOWN if new else name for name, new in zip(names, (unknown > 0.5).tolist(), strict=True)]
+            names = [UNKNOWN_PLACE if new else name for name, new in zip(names, (unknown > 0.5).tolist(), strict=True)]
         taken = np.ones(len(stream), bool) if selected is None else selected
         return Beliefs(stream, places, taken, tuple(names), belief, unknown)
 
@@ -121,7 +121,7 @@ class BeliefRow(NamedTuple):
 
 def format_header(places: Iterable[str], *, unknown: bool = False) -> str:
     """The header line for these places, without its line end; raises OutputError for a name that cannot be a column."""
-    return _line((*COLUMNS, *places, *([UNKNOWN] if unknown else [])))
+    return _line((*COLUMNS, *places, *([UNKNOWN_PLACE] if unknown else [])))
 
 
 def format_row(row: BeliefRow) -> str:
@@ -141,7 +141,7 @@ def format_json_row(places: Iterable[str], row: BeliefRow) -> str:
     values = row._asdict() | {"time": None if math.isnan(row.time) else row.time, "place": row.place or None}
     values["belief"] = dict(zip(places, row.belief, strict=True))
     unknown = values.pop("unknown")
-    return json.dumps(values if unknown is None else values | {UNKNOWN: unknown}, ensure_ascii=False)
+    return json.dumps(values if unknown is None else values | {UNKNOWN_PLACE: unknown}, ensure_ascii=False)
 
 
 def format_beliefs(beliefs: Beliefs, *, as_json: bool = False) -> str:
@@ -203,7 +203,7 @@ def parse_beliefs(text: str, *, name: str, source: Path | str) -> Beliefs:
         selected=np.array([row.selected for row in rows], dtype=np.bool_),
         best=tuple(row.best for row in rows),
         belief=np.array([row.belief for row in rows], dtype=np.float64).reshape(len(rows), len(places)),
-        unknown=np.array([row.unknown for row in rows], dtype=np.float64) if UNKNOWN in answers else None,
+        unknown=np.array([row.unknown for row in rows], dtype=np.float64) if UNKNOWN_PLACE in answers else None,
     )
 
 
@@ -224,12 +224,12 @@ def _places(header: list[str], source: Path | str) -> tuple[str, ...]:
         found, wanted = " ".join(header[: len(COLUMNS)]), " ".join(COLUMNS)
         raise EvaluationError(at(source, 1, f"the header begins {found!r}; the order is {wanted!r}"))
     places = header[len(COLUMNS) :]
-    if places and places[-1] == UNKNOWN:
+    if places and places[-1] == UNKNOWN_PLACE:
         places = places[:-1]
     if not places:
         raise EvaluationError(at(source, 1, f"no column for a place after {COLUMNS[-1]!r}; one per place is needed"))
     for index, place in enumerate(places):
-        if place in places[:index] or place in (*COLUMNS, UNKNOWN, ""):
+        if place in places[:index] or place in (*COLUMNS, UNKNOWN_PLACE, ""):
             raise EvaluationError(at(source, 1, f"{place!r} cannot be the name of one more place; rename that column"))
     return tuple(places)
 
@@ -244,7 +244,7 @@ def _row(fields: list[str], header: list[str], places: tuple[str, ...], answers:
         raise ValueError(f"best is {best!r}, which is no place of the header; the places are {', '.join(places)}")
     cells = fields[len(COLUMNS) :]
     numbers = [_probability(cell, column) for cell, column in zip(cells, header[len(COLUMNS) :], strict=True)]
-    belief, unknown = numbers[: len(places)], numbers[-1] if UNKNOWN in answers else None
+    belief, unknown = numbers[: len(places)], numbers[-1] if UNKNOWN_PLACE in answers else None
     if abs(math.fsum(belief) - 1) > _SUM_TOLERANCE:
         raise ValueError(f"the beliefs sum to {math.fsum(belief):.6g}, not to 1; decode the sequence again")
     return BeliefRow(frame, _seconds(time), place, word, selected == "1", best, belief, unknown)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from placerec.arrays import Floats
 from placerec.errors import ModelError, StreamError
 from placerec.frames.folder import SUFFIXES
-from placerec.hohmm.beliefs import UNKNOWN, Beliefs, list_places
+from placerec.hohmm.beliefs import UNKNOWN_PLACE, Beliefs, list_places
 from placerec.words import Selection, WordStream, selector
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Belief(NamedTuple):
     def best(self) -> str:
         """The most probable place, the first in order where several are; "unknown" if that is above 1/2."""
         if self.unknown is not None and self.unknown > 0.5:
-            return UNKNOWN
+            return UNKNOWN_PLACE
         return self.places[int(np.argmax(self.probability))]
 
     def as_dict(self) -> dict[str, float]:

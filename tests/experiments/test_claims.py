@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from placerec.experiments.grid.claims import FAILS, HOLDS, UNKNOWN, judge
+from placerec.experiments.grid.claims import CANNOT_TELL, FAILS, HOLDS, judge
 from placerec.experiments.grid.results import MissingCellsError, Results, Row, SequenceCount, drawn, scores
 
 SELECTS = ("none", "subsample:3", "subsample:5", "compress:3", "unique")
@@ -89,7 +89,7 @@ def test_they_do_not_hold_where_they_are_false() -> None:
 def test_sequences_that_disagree_cannot_tell() -> None:
     verdicts = {claim.name: claim.verdict for claim in judge(grid(either), "fixed")}
     assert {name: verdicts[name] for name in ("O1", "O2", "O3", "O7", "O8", "O9", "O10", "O11")} == dict.fromkeys(
-        ("O1", "O2", "O3", "O7", "O8", "O9", "O10", "O11"), UNKNOWN
+        ("O1", "O2", "O3", "O7", "O8", "O9", "O10", "O11"), CANNOT_TELL
     )
 
 
@@ -113,7 +113,7 @@ def test_sequences_that_disagree_cannot_tell() -> None:
 )
 def test_what_the_grid_lacks_is_told(lacking: dict[str, Sequence[int]], name: str, reason: str) -> None:
     claims = {claim.name: claim for claim in judge(grid(as_the_paper_says, **lacking), "fixed")}  # type: ignore[arg-type]
-    assert claims[name].verdict == UNKNOWN
+    assert claims[name].verdict == CANNOT_TELL
     assert any(reason in statement.reason for statement in claims[name].statements)
 
 
@@ -146,7 +146,7 @@ def test_the_bootstrap_is_that_of_a_slow_version() -> None:
 def test_an_interval_needs_two_sequences() -> None:
     for sequences, there in ((1, False), (2, True)):
         for claim in judge(grid(as_the_paper_says, sequences=sequences), "fixed"):
-            assert claim.verdict == UNKNOWN
+            assert claim.verdict == CANNOT_TELL
             for one in claim.statements:
                 assert one.values is not None
                 assert (one.interval is not None) == there

@@ -13,7 +13,7 @@ from placerec.arrays import Floats
 from placerec.evaluation.bootstrap import LEAST, middle
 from placerec.experiments.grid.results import MissingCellsError, Results, Scores, mean, scores
 
-HOLDS, FAILS, UNKNOWN = "holds", "does not hold", "cannot tell"
+HOLDS, FAILS, CANNOT_TELL = "holds", "does not hold", "cannot tell"
 # Points: what counts as several percent, as no more than a little, and as among the best.
 SEVERAL, LITTLE, AMONG = 2.0, 2.0, 1.0
 HIGH = 80.0
@@ -46,15 +46,15 @@ class Statement:
 
     @property
     def verdict(self) -> str:
-        """HOLDS, FAILS or UNKNOWN."""
+        """HOLDS, FAILS or CANNOT_TELL."""
         if self.reason or self.interval is None:
-            return UNKNOWN
+            return CANNOT_TELL
         (low, high), t = self.interval, self.threshold
         if self.side == "within":
-            return HOLDS if -t < low and high < t else FAILS if low >= t or high <= -t else UNKNOWN
+            return HOLDS if -t < low and high < t else FAILS if low >= t or high <= -t else CANNOT_TELL
         if self.side == "below":
             low, high, t = -high, -low, -t
-        return HOLDS if low > t else FAILS if high <= t else UNKNOWN
+        return HOLDS if low > t else FAILS if high <= t else CANNOT_TELL
 
     @property
     def wanted(self) -> str:
@@ -74,7 +74,7 @@ class Claim:
     def verdict(self) -> str:
         """HOLDS if all statements hold, FAILS if one does not."""
         verdicts = [statement.verdict for statement in self.statements]
-        return FAILS if FAILS in verdicts else UNKNOWN if UNKNOWN in verdicts else HOLDS
+        return FAILS if FAILS in verdicts else CANNOT_TELL if CANNOT_TELL in verdicts else HOLDS
 
 
 def judge(results: Results, transition: str) -> list[Claim]:
