@@ -3,6 +3,7 @@
 import ctypes
 import errno
 import gzip
+import math
 import os
 import re
 import shutil
@@ -154,8 +155,21 @@ def read_text(path: Path, error: type[PlacerecError]) -> str:
         raise error(_not_utf8(path, data.count(b"\n", 0, cause.start) + 1, data[cause.start])) from cause
 
 
+def all_lines(path: Path | str, error: type[PlacerecError]) -> list[str]:
+    """The lines of a text file, as `split_lines` has them; `error` names what cannot be read."""
+    return split_lines(read_text(Path(path), error))
+
+
+def split_lines(text: str) -> list[str]:
+    """Lines that end in LF or CRLF, the last one also without; a byte order mark is left out.
+
+    Unlike str.splitlines: a frame may be named with one of the dozen characters that Unicode counts as line ends.
+    """
+    return text.removeprefix("\ufeff").replace("\r\n", "\n").removesuffix("\n").split("\n")
+
+
 def read_lines(path: Path, error: type[PlacerecError]) -> Iterator[str]:
-    """The lines of `read_text`, without their LF and a byte order mark, one at a time: the file may be of any size."""
+    """What `all_lines` returns, one line at a time: the file may be of any size."""
     path = Path(path)
     with _reading(path, error), gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
         for number, line in enumerate(file, start=1):
@@ -163,7 +177,16 @@ def read_lines(path: Path, error: type[PlacerecError]) -> Iterator[str]:
                 text = line.decode()
             except UnicodeDecodeError as cause:
                 raise error(_not_utf8(path, number, line[cause.start])) from cause
-            yield text.removeprefix("\ufeff").removesuffix("\n") if number == 1 else text.removesuffix("\n")
+            text = text.removesuffix("\n").removesuffix("\r")
+            yield text.removeprefix("\ufeff") if number == 1 else text
+
+
+def number_in(text: str, otherwise: float = math.nan) -> float:
+    """The number that a text is, `otherwise` for any other text: whoever asks says what is wrong with it."""
+    try:
+        return float(text)
+    except ValueError:
+        return otherwise
 
 
 def content_digest(*parts: Any) -> str:

@@ -14,9 +14,12 @@ import pytest
 from placerec import files
 from placerec.errors import OutputError, StreamError
 from placerec.files import (
+    all_lines,
     content_digest,
     content_digest_of_file,
     held_folder,
+    number_in,
+    read_lines,
     read_text,
     restore_folder,
     sweep_files,
@@ -379,3 +382,16 @@ def test_a_digest_of_a_file_is_that_of_its_bytes(tmp_path: Path) -> None:
     assert content_digest_of_file(path, StreamError) == sha256(b"abc").hexdigest()
     with pytest.raises(StreamError, match=r"b: cannot be read: No such file"):
         content_digest_of_file(tmp_path / "b", StreamError)
+
+
+def test_lines_of_every_editor(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    for data in (b"a\nb\xc2\x85c\n", b"\xef\xbb\xbfa\r\nb\xc2\x85c\r\n", b"a\nb\xc2\x85c"):
+        path.write_bytes(data)
+        assert all_lines(path, StreamError) == list(read_lines(path, StreamError)) == ["a", "b\x85c"]
+
+
+def test_a_number_or_what_is_asked_for_instead() -> None:
+    assert number_in(" 1e-3 ") == 0.001
+    assert np.isnan(number_in("1,5"))
+    assert number_in("", 2.0) == 2.0

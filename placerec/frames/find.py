@@ -8,12 +8,12 @@ import math
 import os
 import sys
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
 from placerec.errors import SourceError, at
+from placerec.files import number_in
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
 from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames
@@ -270,8 +270,7 @@ def _listed_frame(number: int, text: str) -> Frame:
     seconds, place = (*more, "", "")[:2]
     time = math.nan
     if seconds:
-        with suppress(ValueError):
-            time = float(seconds)
+        time = number_in(seconds)
         if not math.isfinite(time):
             raise SourceError(at(STDIN, number, f"{seconds!r} is not a number of seconds; mend it"))
     if place and (reason := check_place(place)):

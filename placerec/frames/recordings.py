@@ -14,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from placerec.errors import SourceError, at
-from placerec.files import read_lines
+from placerec.files import number_in, read_lines
 from placerec.frames import bag, video
 from placerec.frames.places import check_place
 from placerec.frames.sequence import Frame, Recording, SourceOptions
@@ -147,10 +147,7 @@ def _interval(path: Path, number: int, fields: list[str]) -> Interval:
 
 
 def _seconds(path: Path, number: int, field: str) -> float:
-    try:
-        seconds = float(field)
-    except ValueError:
-        seconds = math.nan
+    seconds = number_in(field)
     if not math.isfinite(seconds):
         raise SourceError(at(path, number, f"{field!r} is not a number of seconds; mend it"))
     return seconds

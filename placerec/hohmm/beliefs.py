@@ -18,7 +18,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import EvaluationError, OutputError, at
-from placerec.files import read_text, write_text
+from placerec.files import number_in, read_text, split_lines, write_text
 from placerec.words import WordStream
 
 COLUMNS = ("frame", "time", "place", "word", "selected", "best")
@@ -177,8 +177,7 @@ def parse_beliefs(text: str, *, name: str, source: Path | str) -> Beliefs:
 
     Raises EvaluationError with the line, the value and the remedy if the text is not a beliefs file.
     """
-    # Not splitlines: a frame may be named with one of the dozen characters that Unicode counts as line ends.
-    lines = text.removeprefix("\ufeff").replace("\r\n", "\n").removesuffix("\n").split("\n")
+    lines = split_lines(text)
     if lines == [""]:
         raise EvaluationError(f"{source}: is empty; a beliefs file starts with a header: {' '.join(COLUMNS)} PLACE...")
     header = lines[0].split("\t")
@@ -253,22 +252,14 @@ def _row(fields: list[str], header: list[str], places: tuple[str, ...], answers:
 def _seconds(text: str) -> float:
     if not text:
         return math.nan
-    seconds = _number(text)
+    seconds = number_in(text)
     if not math.isfinite(seconds):
         raise ValueError(f"time is {text!r}, not a number of seconds; leave it empty where it is unknown")
     return seconds
 
 
 def _probability(text: str, column: str) -> float:
-    value = _number(text)
+    value = number_in(text)
     if not 0 <= value <= 1:
         raise ValueError(f"the belief in {column} is {text!r}, not a number from 0 to 1; decode the sequence again")
     return value
-
-
-def _number(text: str) -> float:
-    """The number, nan for any other text: whoever asks names the column."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan

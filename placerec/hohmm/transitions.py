@@ -18,7 +18,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError, at
-from placerec.files import read_text
+from placerec.files import all_lines, number_in
 
 PER = ("update", "frame", "second")
 # Numbers written with three digits may miss 1 by as much; more is a mistake.
@@ -121,8 +121,7 @@ def read_transitions(path: Path | str, places: Sequence[str]) -> Floats:
     Raises ModelError with the line, the value and the remedy for what is not by the grammar.
     """
     path = Path(path)
-    text = read_text(path, ModelError).removeprefix("\ufeff").replace("\r\n", "\n")
-    lines = [(number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip()]
+    lines = [(number, line) for number, line in enumerate(all_lines(path, ModelError), start=1) if line.strip()]
     if not lines:
         raise ModelError(f"{path}: is empty; a header of places and one row per place are expected")
     (first, head), *rows = lines
@@ -143,10 +142,7 @@ def _row(path: Path, number: int, line: str, header: Sequence[str]) -> list[floa
         raise ModelError(at(path, number, f"{len(cells)} fields found, {len(header)} expected as in the header"))
     values = []
     for cell, place in zip(cells, header, strict=True):
-        try:
-            value = float(cell)
-        except ValueError:
-            value = math.nan
+        value = number_in(cell)
         if not 0 <= value <= 1:
             raise ModelError(at(path, number, f"{cell!r} under {place!r} is no probability from 0 to 1"))
         values.append(value)

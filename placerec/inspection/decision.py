@@ -7,7 +7,7 @@ from typing import Any
 
 from placerec.errors import EvaluationError, at
 from placerec.figures.pages import heading, html_page, paragraph, table
-from placerec.files import read_text, write_text
+from placerec.files import all_lines, write_text
 from placerec.hohmm.explain import EXPLAINED, WINDOW
 from placerec.words.stream import format_seconds
 
@@ -33,9 +33,8 @@ def read_decision(path: Path | str, frame: str) -> Decision:
 
     Raises EvaluationError if there is none, there are several, or it is no such file.
     """
-    # Not splitlines: a frame may be named with one of the dozen characters that Unicode counts as line ends.
-    lines = read_text(Path(path), EvaluationError).removesuffix("\n").split("\n")
-    decisions = [_decision(path, number, line) for number, line in enumerate(lines, start=1) if line]
+    lines = enumerate(all_lines(path, EvaluationError), start=1)
+    decisions = [_decision(path, number, line) for number, line in lines if line]
     found = [one for one in decisions if one["frame"] == frame] or [
         one for one in decisions if one["frame"].startswith(frame)
     ]

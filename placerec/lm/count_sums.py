@@ -10,7 +10,7 @@ import numpy as np
 
 from placerec.arrays import Ints
 from placerec.errors import LanguageModelError, at
-from placerec.files import read_text
+from placerec.files import all_lines
 from placerec.jobs import Executor
 from placerec.lm.counts import NgramCounts, add_counts, count_text, numbered, tabulate
 from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
@@ -80,7 +80,7 @@ def read_counts(path: Path, vocabulary: Vocabulary, order: int) -> NgramCounts:
     """
     numbers: list[list[int]] = [[] for _ in range(order)]
     counts: list[list[int]] = [[] for _ in range(order)]
-    for i, line in enumerate(read_text(path, LanguageModelError).split("\n"), start=1):
+    for i, line in enumerate(all_lines(path, LanguageModelError), start=1):
         ngram, _, count = line.rpartition("\t")
         words = ngram.split(" ")
         if not line:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from placerec.errors import ModelError, OutputError, StreamError, at
-from placerec.files import whole_folder, write_text
+from placerec.files import number_in, whole_folder, write_text
 from placerec.frames import SourceOptions
 from placerec.hohmm import (
     Belief,
@@ -153,10 +153,7 @@ def _fields(line: str, frame: int) -> tuple[str, float, float]:
 def _number(text: str, frame: int, complaint: str) -> float:
     if not text.strip():
         return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_in(text)
     if not math.isfinite(value):
         raise StreamError(at("<stdin>", frame + 1, complaint))
     return value

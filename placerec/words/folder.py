@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from placerec.errors import StreamError, at, refuse_string
-from placerec.files import encoded, read_text, whole_folder, write_text
+from placerec.files import all_lines, encoded, read_text, whole_folder, write_text
 from placerec.frames.naming import unique_names
 from placerec.version import __version__
 from placerec.words.stream import HEADER, WordStream, check_word, format_rows, read_stream, stream_name
@@ -68,9 +68,8 @@ def each_stream(files: Sequence[Path]) -> Iterator[WordStream]:
 
 def read_vocabulary(path: Path | str) -> tuple[str, ...]:
     """The words of a vocab.txt, one a line, in its order; StreamError for an empty file or a word listed twice."""
-    lines = read_text(Path(path), StreamError).removeprefix("\ufeff").splitlines()
     words: dict[str, int] = {}
-    for i, line in enumerate(lines, start=1):
+    for i, line in enumerate(all_lines(path, StreamError), start=1):
         if not line.strip():
             continue
         word = check_word(path, i, line.strip())

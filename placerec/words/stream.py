@@ -20,7 +20,7 @@ import numpy as np
 
 from placerec.arrays import Floats
 from placerec.errors import StreamError, at, refuse_string
-from placerec.files import read_text, write_text
+from placerec.files import all_lines, number_in, write_text
 from placerec.frames.places import check_place
 from placerec.frames.table import FrameTable
 
@@ -133,7 +133,7 @@ def read_stream(path: Path | str) -> WordStream:
     Raises StreamError, naming the file, the line and the value, for what is not by the grammar.
     """
     path = Path(path)
-    lines = read_text(path, StreamError).removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
+    lines = all_lines(path, StreamError)
     header = lines[0].split("\t")
     name = stream_name(path)
     if "word" not in header:
@@ -175,10 +175,7 @@ def check_word(path: Path | str, line: int, word: str) -> str:
 def _numbers(path: Path, lines: Iterable[int], title: str, texts: Sequence[str]) -> Floats:
     numbers = np.full(len(texts), np.nan)
     for row, (i, text) in enumerate(zip(lines, texts, strict=True)):
-        try:
-            numbers[row] = float(text) if text else np.nan
-        except ValueError:
-            numbers[row] = np.inf
+        numbers[row] = number_in(text, np.inf) if text else np.nan
         if np.isinf(numbers[row]):
             raise StreamError(at(path, i, f"{title} {text!r} is not a number"))
     return numbers
@@ -186,7 +183,7 @@ def _numbers(path: Path, lines: Iterable[int], title: str, texts: Sequence[str])
 
 def locate(path: Path, column: str, value: str) -> str:
     """`path:line` of the first `value` in a column of a token stream, or among the words of a plain text."""
-    lines = read_text(path, StreamError).removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
+    lines = all_lines(path, StreamError)
     header = lines[0].split("\t")
     for number, line in enumerate(lines, start=1):
         if "word" not in header:
