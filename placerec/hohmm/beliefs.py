@@ -20,6 +20,7 @@ from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import EvaluationError, OutputError, at
 from placerec.files import number_in, read_text, split_lines, write_text
 from placerec.words import WordStream
+from placerec.words.stream import format_seconds
 
 COLUMNS = ("frame", "time", "place", "word", "selected", "best")
 UNKNOWN_PLACE = "unknown"
@@ -129,11 +130,11 @@ def format_row(row: BeliefRow) -> str:
 
     Raises OutputError for a text that holds a tab or a line end.
     """
-    # Not repr: frames are often stamped in epoch seconds, where anything after the microsecond is noise.
-    seconds = "" if math.isnan(row.time) else np.format_float_positional(row.time, precision=6, trim="-")
     numbers = [*row.belief] if row.unknown is None else [*row.belief, row.unknown]
     texts = (f"{p:.9g}" for p in numbers)
-    return _line((row.frame, seconds, row.place, row.word, "1" if row.selected else "0", row.best, *texts))
+    return _line(
+        (row.frame, format_seconds(row.time), row.place, row.word, "1" if row.selected else "0", row.best, *texts)
+    )
 
 
 def format_json_row(places: Iterable[str], row: BeliefRow) -> str:

@@ -57,7 +57,7 @@ class BackoffModel:
     def perplexity(self, sentences: Iterable[Sequence[str]]) -> "Totals":
         """What the model makes of sentences of words: `sentences, words, oovs, zeroprobs, log10_p, ppl, ppl1`.
 
-        Counted as `ngram -ppl` does: each sentence between <s> and </s>, no context spans two; words without
+        Counted as `ngram -ppl` does: each sentence between `<s>` and `</s>`, no context spans two; words without
         probability are counted (`oovs`: unknown, `zeroprobs`: known), and neither in `log10_p` nor in `ppl`, which
         counts words and sentence ends (`ppl1`: words alone; None where there are none).
         """
