@@ -13,7 +13,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import ModelError, StreamError
 from placerec.lm import BackoffModel
-from placerec.lm.external import Scorer
+from placerec.lm.check import Scorer
 from placerec.words import Selection, WordStream, select
 
 # What every ARPA file lists beside its words.
@@ -21,7 +21,7 @@ MARKERS = frozenset({"<s>", "</s>", "<unk>"})
 
 
 class Emissions(Protocol):
-    """What the filter asks of the models of C places; `lm.union.ModelUnion` is one."""
+    """What the filter asks of the models of C places; `lm.backoff.ModelUnion` is one."""
 
     def score(self, words: Sequence[str]) -> Floats:
         """log10 p float64 (T, C) of each of T words in each place, after the words before it."""

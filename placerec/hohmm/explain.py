@@ -27,6 +27,7 @@ from placerec.hohmm.transitions import Transition
 from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
 from placerec.lm.inspect import explain as explain_word
+from placerec.lm.logs import LOG_ZERO
 from placerec.words import WordStream
 
 # A decision as plain data: a line of NAME.explain.jsonl (docs/files.md).
@@ -37,8 +38,6 @@ EXPLAINED = ".explain.jsonl"
 WINDOW, NAMED = 20, 3
 # What moved the odds by less, in decimal logarithms, is no argument.
 LEAST = 0.01
-# log10 p of a word that a place rules out: what SRILM writes for a probability of 0.
-NEVER = -99.0
 _OF_PLACE, _OF_UNKNOWN = ("log10_p", "before", "after"), ("log10_ratio", "before", "after")
 
 
@@ -132,7 +131,7 @@ def contributions(part: Evidence, transition: Transition, before: Floats, after:
     found = np.zeros((U, WINDOW))
     if C < 2:
         return found
-    evidence = np.maximum(part.log10_likelihoods, NEVER)
+    evidence = np.maximum(part.log10_likelihoods, LOG_ZERO)
     # A word that no place explains left the prediction as it was.
     evidence[np.isneginf(part.log10_likelihoods).all(axis=1)] = 0.0
     steps = transition_steps(transition, part.elapsed[1:])

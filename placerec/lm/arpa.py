@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import LanguageModelError, at
 from placerec.files import read_text, write_text
-from placerec.lm.arpa_text import LOG_ZERO, first_lines
+from placerec.lm.arpa_text import first_lines
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.trie import Trie, Vocabulary
+from placerec.lm.logs import LOG_ZERO
+from placerec.lm.trie import Trie
+from placerec.lm.vocabulary import Vocabulary
 
 log = logging.getLogger(__name__)
 # No file has 10^18 n-grams; of more digits Python may not make a number.

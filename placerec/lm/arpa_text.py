@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask, Singles
+from placerec.lm.logs import LOG_ZERO
 
-LOG_ZERO = -99.0
 Cells = NDArray[np.uint64]
 # Words with their blank that are longer than this would make most of a line NUL bytes.
 _WIDEST = 32

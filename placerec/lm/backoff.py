@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
-from placerec.lm.score import Ngrams, ScoreTables, build_tables
-from placerec.lm.trie import Trie, Vocabulary, runs
+from placerec.errors import LanguageModelError, refuse_string
+from placerec.lm.score import Contexts, Ngrams, ScoreTables, build_tables
+from placerec.lm.trie import Trie, runs
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN, Vocabulary
 
 if TYPE_CHECKING:
     from placerec.lm.perplexity import Totals
@@ -61,14 +63,28 @@ class BackoffModel:
         probability are counted (`oovs`: unknown, `zeroprobs`: known), and neither in `log10_p` nor in `ppl`, which
         counts words and sentence ends (`ppl1`: words alone; None where there are none).
         """
-        from placerec.lm.perplexity import measure
+        from placerec.lm.perplexity import Totals, tally_sentences
 
-        return measure(self, sentences)
+        refuse_string(sentences, LanguageModelError)
+        marked = []
+        for sentence in sentences:
+            refuse_string(sentence, LanguageModelError)
+            marked.append([SENTENCE_START, *sentence, SENTENCE_END])
+        lengths = np.array([len(words) for words in marked], np.int64)
+        starts = np.cumsum(lengths) - lengths
+        ids = self.ids([word for words in marked for word in words])
+        digits = self.tables.digits(ids)
+        log10_p, _ = self.tables.find(Contexts(self.tables, digits, starts), digits)
+        scored = np.ones(len(ids), bool)
+        scored[starts] = False
+        unknown = ids == self.trie.vocabulary.index.get(UNKNOWN, -1)
+        rows = tally_sentences(log10_p.astype(np.float32), unknown, scored, lengths, np.ones(len(lengths), bool))
+        return Totals(*rows.sum(axis=0).tolist())
 
     def ids(self, words: Sequence[str]) -> Ints:
         """Word numbers int64 (T,); `<unk>`'s, or -1 if it is not listed, for words that are not listed."""
         ids = self.trie.vocabulary.ids(words)
-        ids[ids < 0] = self.trie.vocabulary.index.get("<unk>", -1)
+        ids[ids < 0] = self.trie.vocabulary.index.get(UNKNOWN, -1)
         return ids
 
     @cached_property

@@ -1,7 +1,12 @@
-"""Is a model right? Every context must sum to 1, and KenLM must give every word of any stream the same probability."""
+"""Is a model right? Every context must sum to 1, and KenLM must give every word of any stream the same probability.
+
+KenLM is an independent scorer: optional, never the trainer.
+"""
 
 import math
-from collections.abc import Iterator
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,18 +14,20 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import LanguageModelError, check_optional
+from placerec.files import read_text
 from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.external import KENLM_MAX_ORDER, KENLM_PURPOSE, kenlm_scorer
+from placerec.lm.logs import ABOUT_LOG_ZERO
 from placerec.lm.trie import per_context
 
 # Half a unit of the seventh digit for each of the terms that a context's sum is made of.
 SUM_TOLERANCE = 1e-5
 # KenLM adds float32 numbers, we add float64 ones: `float32` keeps 7 digits of values up to 100.
 AGREEMENT_TOLERANCE = 2e-6
-# Both stand for log 0.
-LOG_ZERO = -90.0
 _LARGEST_POWER = 308
+KENLM_MAX_ORDER = 6
+KENLM_PURPOSE = "scoring with KenLM"
+Scorer = Callable[[Sequence[str]], Floats]
 
 
 @dataclass(frozen=True)
@@ -145,5 +152,45 @@ def check_model(path: Path | str, *, tokens: int = 2000, seed: int = 0) -> Model
 
 
 def _largest_difference(ours: Floats, theirs: Floats) -> float:
-    zero = (ours < LOG_ZERO) & (theirs < LOG_ZERO)
+    zero = (ours < ABOUT_LOG_ZERO) & (theirs < ABOUT_LOG_ZERO)
     return float(np.abs(np.where(zero, 0.0, ours) - np.where(zero, 0.0, theirs)).max(initial=0.0))
+
+
+def kenlm_scorer(path: Path | str) -> Scorer:
+    """A function that gives KenLM's log10 p float64 (T,) of T words: empty first context, no markers.
+
+    Order 1, which KenLM refuses, is loaded through a temporary copy that is padded with one bigram. Raises
+    MissingExtraError if KenLM is not installed, LanguageModelError for a file that it cannot load.
+    """
+    check_optional("kenlm", KENLM_PURPOSE)
+    import kenlm
+
+    config = kenlm.Config()
+    config.show_progress = False
+    config.arpa_complain = kenlm.ARPALoadComplain.NONE
+    order = read_arpa(path).order
+    if order > KENLM_MAX_ORDER:
+        raise LanguageModelError(
+            f"{path}: order {order}; KenLM scores orders up to {KENLM_MAX_ORDER}; use the native scorer"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        loadable = Path(path)
+        if order == 1:
+            loadable = Path(folder) / "padded.arpa"
+            loadable.write_text(_padded(read_text(Path(path), LanguageModelError)), encoding="utf-8")
+        try:
+            model = kenlm.Model(str(loadable), config)
+        except OSError as error:
+            raise LanguageModelError(f"{path}: KenLM cannot load it: {str(error).splitlines()[0]}") from error
+
+    def score(words: Sequence[str]) -> Floats:
+        return np.array([p for p, _, _ in model.full_scores(" ".join(words), bos=False, eos=False)], np.float64)
+
+    return score
+
+
+def _padded(text: str) -> str:
+    """A unigram ARPA text with a bigram that no stream without markers ever asks for."""
+    text = re.sub(r"^(ngram\s+1\s*=.*)$", r"\1\nngram 2=1", text, count=1, flags=re.MULTILINE)
+    head, _, _ = text.partition("\\end\\")
+    return f"{head}\\2-grams:\n-99\t<s> </s>\n\n\\end\\\n"

@@ -11,11 +11,10 @@ from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import Context, Rule
 from placerec.lm.logs import EPSILON, log10, p_of
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
-from placerec.lm.mutable import MutableModel, insert_prefixes, weigh_contexts
+from placerec.lm.mutable import SILENT, MutableModel, Trace, insert_prefixes, weigh_contexts
 from placerec.lm.smoothings import Smoothing
-from placerec.lm.trace import SILENT, Trace
 from placerec.lm.trie import Trie, per_context, runs
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
 
 
 def estimate(

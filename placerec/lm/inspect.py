@@ -12,8 +12,8 @@ from placerec.files import read_text
 from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.check import context_sums, power_of_ten
-from placerec.lm.markers import SENTENCE_START
 from placerec.lm.score import Contexts
+from placerec.lm.vocabulary import SENTENCE_START
 
 
 def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5) -> dict[str, Any]:

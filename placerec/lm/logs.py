@@ -5,6 +5,9 @@ import numpy as np
 from placerec.arrays import Floats, Singles
 
 EPSILON = 3e-6
+# What SRILM writes for the logarithm of 0; whatever is below the second is one, however it was added up; and the least
+# logarithm that compute-best-mix goes on with.
+LOG_ZERO, ABOUT_LOG_ZERO, LEAST_LOG10 = -99.0, -90.0, -320.0
 LN10 = 2.30258509299404568402
 
 

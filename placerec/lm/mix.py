@@ -10,8 +10,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LN10, log10, p_of
-from placerec.lm.mutable import MutableModel, reweigh
-from placerec.lm.trace import SILENT, Trace
+from placerec.lm.mutable import SILENT, MutableModel, Trace, reweigh
 
 
 def merge_weight(weights: Sequence[float], k: int) -> float:

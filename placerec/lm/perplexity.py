@@ -1,18 +1,12 @@
 """What the probabilities of a text's words sum up to: sections 10.1 and 10.2 of our SRILM specification."""
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
-from placerec.errors import LanguageModelError, refuse_string
 from placerec.lm.logs import EPSILON, LN10
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
-
-if TYPE_CHECKING:
-    from placerec.lm.backoff import BackoffModel
 
 TOP_RANKS = (1, 5, 10)
 
@@ -53,27 +47,6 @@ def _perplexity(log10_p: float, predicted: float) -> float | None:
         return None
     with np.errstate(over="ignore"):
         return float(np.exp(np.float64(-(log10_p / predicted) * LN10)))
-
-
-def measure(model: "BackoffModel", sentences: Iterable[Sequence[str]]) -> Totals:
-    """The totals of sentences of words, each scored between <s> and </s>; no context spans two sentences."""
-    from placerec.lm.score import Contexts
-
-    refuse_string(sentences, LanguageModelError)
-    marked = []
-    for sentence in sentences:
-        refuse_string(sentence, LanguageModelError)
-        marked.append([SENTENCE_START, *sentence, SENTENCE_END])
-    lengths = np.array([len(words) for words in marked], np.int64)
-    starts = np.cumsum(lengths) - lengths
-    ids, tables = model.ids([word for words in marked for word in words]), model.tables
-    digits = tables.digits(ids)
-    log10_p, _ = tables.find(Contexts(tables, digits, starts), digits)
-    unknown = ids == model.trie.vocabulary.index.get(UNKNOWN, -1)
-    scored = np.ones(len(ids), bool)
-    scored[starts] = False
-    rows = tally_sentences(log10_p.astype(np.float32), unknown, scored, lengths, np.ones(len(lengths), bool))
-    return Totals(*rows.sum(axis=0).tolist())
 
 
 def tally_sentences(log10_p: Singles, unknown: Mask, scored: Mask, lengths: Ints, ended: Mask) -> Floats:

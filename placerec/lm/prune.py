@@ -7,9 +7,8 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.logs import EPSILON, LN10, p_of
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START
-from placerec.lm.mutable import MutableModel, context_masses, insert_prefixes, reweigh, settle_masses
-from placerec.lm.trace import SILENT, Trace
+from placerec.lm.mutable import SILENT, MutableModel, Trace, context_masses, insert_prefixes, reweigh, settle_masses
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 
 
 def prune(

@@ -11,14 +11,19 @@ import numpy as np
 
 from placerec.arrays import Mask
 from placerec.errors import LanguageModelError
-from placerec.lm.count_statistics import (
+from placerec.lm.counts import NgramCounts
+from placerec.lm.discounts import (
+    Discount,
+    absolute,
+    additive,
     counts_of_counts,
     kneser_ney_discount,
     left_neighbour_counts,
+    lidstone,
+    modified_kneser_ney,
     modified_kneser_ney_discounts,
+    witten_bell,
 )
-from placerec.lm.counts import NgramCounts
-from placerec.lm.discounts import Discount, absolute, additive, lidstone, modified_kneser_ney, witten_bell
 
 T = TypeVar("T")
 

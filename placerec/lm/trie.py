@@ -5,7 +5,7 @@ number order is text order. The n-grams of order n are rows; a row is known by t
 table below and by its last word. Order 1 is dense: row = word number.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -15,33 +15,7 @@ from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Mask
 from placerec.lm.row_index import RowIndex
-
-
-@dataclass(frozen=True)
-class Vocabulary:
-    """Words in code-point order; a word's number is its place in the order."""
-
-    words: tuple[str, ...]
-    index: dict[str, int] = field(repr=False)
-
-    @staticmethod
-    def of(words: Iterable[str]) -> "Vocabulary":
-        """The vocabulary of the distinct `words`."""
-        ordered = tuple(sorted(set(words)))
-        return Vocabulary(ordered, {word: number for number, word in enumerate(ordered)})
-
-    def __len__(self) -> int:
-        return len(self.words)
-
-    def ids(self, words: Sequence[str]) -> Ints:
-        """Word numbers int64 (T,) of T words, -1 for a word that is not listed."""
-        return np.fromiter((self.index.get(word, -1) for word in words), np.int64, len(words))
-
-    def mask(self, words: Iterable[str]) -> Mask:
-        """bool (V,), true at those of `words` that are listed."""
-        mask = np.zeros(len(self), bool)
-        mask[[self.index[word] for word in words if word in self.index]] = True
-        return mask
+from placerec.lm.vocabulary import Vocabulary
 
 
 @dataclass(frozen=True)

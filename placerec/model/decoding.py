@@ -20,7 +20,7 @@ from placerec.hohmm import (
 )
 from placerec.hohmm.evidence import MARKERS
 from placerec.hohmm.unknown import UnknownModel, unknown_model, word_runs
-from placerec.lm.external import kenlm_scorer
+from placerec.lm.check import kenlm_scorer
 from placerec.model.folder import PlaceModels, load_model
 from placerec.words import WordStream
 from placerec.words.folder import check_dictionary, read_streams, stream_files

@@ -18,8 +18,8 @@ from placerec.lm import (
     with_unigrams,
     write_arpa,
 )
-from placerec.lm.count_sums import count_texts
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.counts import count_texts
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.model.corpus import gather_corpus
 from placerec.model.folder import OWNED, ModelDescription, ModelFolder
 from placerec.model.options import ModelOptions

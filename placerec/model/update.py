@@ -16,10 +16,8 @@ from placerec.files import held_folder, read_text, restore_folder, whole_folder,
 from placerec.frames.naming import with_parent
 from placerec.frames.places import check_twins
 from placerec.lm import NgramCounts, count_ngrams
-from placerec.lm.count_sums import read_counts, subtract_counts
-from placerec.lm.counts import add_counts
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START
-from placerec.lm.trie import Vocabulary
+from placerec.lm.counts import add_counts, read_counts, subtract_counts
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, Vocabulary
 from placerec.model.corpus import Corpus, holds_sentences, read_corpus
 from placerec.model.folder import MODEL_JSON, OWNED, ModelDescription, ModelFolder
 from placerec.model.options import ModelOptions

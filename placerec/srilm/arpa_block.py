@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
+from placerec.lm.logs import LOG_ZERO
 from placerec.srilm.fields import LONGEST_NAME, Fields, Packed, split_lines, with_odd_bytes
 
-LOG_ZERO = -99.0
 # So many numbers are sooner converted one by one.
 _FEW = 200
 _NUMBER = re.compile(rb"-?\d+(\.\d*)?([eE][-+]?\d+)?")

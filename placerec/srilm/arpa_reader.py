@@ -8,7 +8,8 @@ from itertools import chain
 import numpy as np
 
 from placerec.arrays import Ints, Mask
-from placerec.srilm.arpa_block import LOG_ZERO, Block, parse_block
+from placerec.lm.logs import LOG_ZERO
+from placerec.srilm.arpa_block import Block, parse_block
 from placerec.srilm.fields import Fields, NameTable
 from placerec.srilm.options import bounded_int, leading_float
 from placerec.srilm.streams import SPACES, Lines, SrilmError, Streams, tokens

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from io import BytesIO
 
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.vocabulary import WordList, read_words
 

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.arrays import Floats
-from placerec.lm.logs import LN10
+from placerec.lm.logs import LEAST_LOG10, LN10
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import SrilmError, Streams, exit_status
 
 TOOL = "compute-best-mix"
 USAGE = 'usage: {tool} [lambda="L1 L2 ..."] [precision=P] PPL1 PPL2 ...  (outputs of ngram -debug 2 -ppl)'
-# What stands for the logarithm of 0.
-_LOG_ZERO = -320.0
 # Beyond this, exp ends.
 _MOST = 709.0
 _TOKEN = re.compile(r"\tp\( .* \[ (\S+)(?: \*(\S+))? \](?: / \S+)?\s*$")
@@ -33,7 +31,7 @@ def compute_best_mix(arguments: Sequence[str], streams: Streams, tool: str = TOO
         raise SrilmError(f"{tool}: precision={settings['precision']}: a number above 0 is needed", 2)
     start = starting_weights(settings.get("lambda", "0.5"), len(names), tool)
     log10_p, counts = _tokens(names, streams, tool)
-    known = (log10_p > _LOG_ZERO).any(axis=0)
+    known = (log10_p > LEAST_LOG10).any(axis=0)
     log10_p, counts = log10_p[:, known], counts[known]
     weights, steps = best_mix(np.exp(log10_p * LN10), start, precision, counts=counts)
     total = float(counts.sum())
@@ -80,7 +78,9 @@ def _tokens(names: Sequence[str], streams: Streams, tool: str) -> tuple[Floats, 
 
 def _log10(text: str) -> float:
     value = leading_float(text)
-    return min(max(_LOG_ZERO, value), -_LOG_ZERO / 2) if value is not None and not math.isnan(value) else _LOG_ZERO
+    if value is None or math.isnan(value):
+        return LEAST_LOG10
+    return min(max(LEAST_LOG10, value), -LEAST_LOG10 / 2)
 
 
 def _count(text: str | None) -> float:

@@ -6,9 +6,9 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints
 from placerec.lm.logs import p_of
-from placerec.lm.markers import SENTENCE_END
 from placerec.lm.perplexity import Ranks, Totals
 from placerec.lm.score import TokenSequence
+from placerec.lm.vocabulary import SENTENCE_END
 from placerec.srilm.counts_file import MALFORMED, MOST_TOKENS, parse_count
 from placerec.srilm.report import RANKS, TOKENS, Printer, block
 from placerec.srilm.scorers import ModelView, Scorer

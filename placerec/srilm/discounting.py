@@ -8,21 +8,19 @@ import numpy as np
 
 from placerec.arrays import Ints, Mask
 from placerec.errors import LanguageModelError
-from placerec.lm.count_statistics import (
-    counts_of_counts,
-    good_turing_factors,
-    kneser_ney_discount,
-    left_neighbour_counts,
-    modified_kneser_ney_discounts,
-)
 from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import (
     Discount,
     Rule,
     absolute,
     additive,
+    counts_of_counts,
     good_turing,
+    good_turing_factors,
+    kneser_ney_discount,
+    left_neighbour_counts,
     modified_kneser_ney,
+    modified_kneser_ney_discounts,
     natural,
     witten_bell,
 )

@@ -7,7 +7,8 @@ import numpy as np
 
 from placerec.arrays import Ints
 from placerec.lm.counts import NgramCounts
-from placerec.lm.trie import Trie, Vocabulary
+from placerec.lm.trie import Trie
+from placerec.lm.vocabulary import Vocabulary
 from placerec.srilm.counts_file import Table
 from placerec.srilm.hashing import first_positions, walk_order
 from placerec.srilm.text import Text

@@ -6,7 +6,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LN10
-from placerec.lm.trace import Trace
+from placerec.lm.mutable import Trace
 from placerec.lm.trie import Trie
 from placerec.srilm.streams import Streams
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from placerec.arrays import Singles
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.score import TokenSequence
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.arpa_lookup import read_tables
 from placerec.srilm.ngram_options import OPTIONS
 from placerec.srilm.options import Parsed, parse
@@ -135,7 +135,7 @@ class _Run:
 
     def generate(self, scorer: Scorer) -> None:
         """`-gen`: sentences drawn from the model, behind each prefix if there are some."""
-        from placerec.lm.generate import generate
+        from placerec.lm.score import generate
 
         options, index = self.options, self.words.index
         rng = np.random.Generator(np.random.PCG64(None if options["seed"] is None else abs(options["seed"])))

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from placerec.lm.arpa import arpa_blocks
-from placerec.lm.count_statistics import recomputed
-from placerec.lm.counts import NgramCounts, add_counts, format_counts
+from placerec.lm.counts import NgramCounts, add_counts, format_counts, recomputed
 from placerec.lm.discounts import Rule
 from placerec.lm.estimation import estimate_mutable
 from placerec.lm.mutable import insert_prefixes

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 
 from placerec.lm.arpa import row_blocks
+from placerec.lm.logs import LOG_ZERO
 from placerec.lm.mix import merge, merge_weight
 from placerec.lm.mutable import MutableModel, reweigh, unite
 from placerec.lm.prune import prune, prune_improbable
@@ -141,7 +142,7 @@ class Models:
         unknown_p, stand_in = self.options["unk-prob"], self.options["zeroprob-word"]
         if unknown_p is None and stand_in is None:
             return scorer
-        if unknown_p == -99:
+        if unknown_p == LOG_ZERO:
             unknown_p = -np.inf
         return Lenient(scorer, self.words, unknown_p, None if stand_in is None else self.words.add(stand_in))
 

@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from placerec.arrays import Ints, Mask, Singles
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.score import Contexts, ScoreTables, TokenSequence, joint_log10_p
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.vocabulary import WordList
 
 Tag = Callable[[int], str]

@@ -9,8 +9,8 @@ import numpy as np
 
 from placerec.ahead import make_ahead
 from placerec.arrays import Floats, Ints, Mask
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.score import TokenSequence
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.fields import NameTable, split_lines, usual_blocks, with_odd_bytes, without_comments
 from placerec.srilm.options import leading_float
 from placerec.srilm.streams import Lines, Streams, tokens

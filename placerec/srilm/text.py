@@ -10,8 +10,8 @@ import numpy as np
 from placerec.ahead import work_ahead
 from placerec.arrays import Ints
 from placerec.lm.counts import NgramCounts, count_text
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START
 from placerec.lm.stored_text import BLOCK, Numbers, StoredText
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.counts_file import parse_count
 from placerec.srilm.fields import unusual, usual_blocks
 from placerec.srilm.numbering import Numbering, cut_words

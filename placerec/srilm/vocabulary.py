@@ -3,11 +3,11 @@
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from placerec.lm.markers import SENTENCE_END, SENTENCE_START, UNKNOWN
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.srilm.streams import Streams, tokens
 
 if TYPE_CHECKING:
-    from placerec.lm.trie import Vocabulary
+    from placerec.lm.vocabulary import Vocabulary
 
 PAUSE = "-pau-"
 
@@ -84,7 +84,7 @@ class WordList:
 
     def sorted(self) -> "tuple[Vocabulary, list[int]]":
         """The vocabulary of the language-model room, and the number there of each number here (-1: lost)."""
-        from placerec.lm.trie import Vocabulary
+        from placerec.lm.vocabulary import Vocabulary
 
         vocabulary = Vocabulary.of(word for word in self.words if word is not None)
         return vocabulary, [-1 if word is None else vocabulary.index[word] for word in self.words]

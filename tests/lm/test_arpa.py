@@ -21,7 +21,8 @@ from placerec.lm import (
     write_arpa,
 )
 from placerec.lm.arpa import as_printed
-from placerec.lm.trie import Trie, Vocabulary
+from placerec.lm.trie import Trie
+from placerec.lm.vocabulary import Vocabulary
 
 # Orders and markers that KenLM does not do without: rules of its own, not of the format.
 KENLM_ONLY = {

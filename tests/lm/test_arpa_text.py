@@ -10,7 +10,8 @@ from placerec.lm import arpa_text
 from placerec.lm.arpa import format_arpa, read_arpa
 from placerec.lm.arpa_text import PackedLines, PlainLines, first_lines, number_cells
 from placerec.lm.backoff import BackoffModel
-from placerec.lm.trie import Trie, Vocabulary
+from placerec.lm.trie import Trie
+from placerec.lm.vocabulary import Vocabulary
 
 SINGLES = st.floats(width=32, allow_nan=False)
 NEAR = [np.nextafter(np.float32(10.0**e), np.float32(way)) for e in range(-6, 8) for way in (0, 10.0**e, np.inf)]

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from placerec.errors import LanguageModelError
 from placerec.lm import NgramCounts, count_ngrams, format_counts
-from placerec.lm.count_sums import count_texts, read_counts, subtract_counts
-from placerec.lm.counts import add_counts
+from placerec.lm.counts import add_counts, count_texts, read_counts, subtract_counts
 
 VOCABULARY = ("a", "b", "c", "d")
 SENTENCES = st.lists(st.lists(st.sampled_from(VOCABULARY), max_size=8), max_size=6)

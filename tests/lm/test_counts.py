@@ -13,7 +13,7 @@ from placerec import reference
 from placerec.lm import NgramCounts, count_ngrams, format_counts
 from placerec.lm.counts import count_text
 from placerec.lm.stored_text import StoredText
-from placerec.lm.trie import Vocabulary
+from placerec.lm.vocabulary import Vocabulary
 
 sentences_of_words = st.lists(st.lists(st.sampled_from(["a", "b", "c", "d"]), max_size=8), max_size=6)
 
@@ -82,7 +82,7 @@ def little_memory() -> Iterator[None]:
         patch("placerec.lm.stored_text.BLOCK", 5),
         patch("placerec.lm.counts.BLOCK", 5),
         patch("placerec.lm.stored_text.IN_MEMORY", 8),
-        patch("placerec.lm.windows.WAITING", 3),
+        patch("placerec.lm.stored_text.WAITING", 3),
     ):
         yield
 

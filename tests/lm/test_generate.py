@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from placerec.arrays import Singles
-from placerec.lm.generate import draw_word, generate
+from placerec.lm.score import draw_word, generate
 
 P = np.array([0.1, 0.6, 0.3])
 

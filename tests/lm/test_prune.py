@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from placerec.arrays import Ints
 from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
 from placerec.lm.check import context_sums
-from placerec.lm.mutable import mutable_models, reweigh
+from placerec.lm.mutable import SILENT, Trace, mutable_models, reweigh
 from placerec.lm.prune import joint_log10_p, prune, prune_improbable
-from placerec.lm.trace import SILENT, Trace
 
 SILENT_WORDS = ["<s>", "<unk>"]
 texts = st.lists(st.lists(st.sampled_from("abcd"), min_size=1, max_size=10), min_size=1, max_size=6)

@@ -6,7 +6,7 @@ import pytest
 from placerec.errors import LanguageModelError
 from placerec.lm import SMOOTHINGS, count_ngrams, estimate, smoothing
 from placerec.lm.check import context_sums
-from placerec.lm.count_statistics import (
+from placerec.lm.discounts import (
     counts_of_counts,
     good_turing_factors,
     kneser_ney_discount,

@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.arrays import Ints
-from placerec.lm.trie import Vocabulary, build_trie, closed_trie, endings
+from placerec.lm.trie import build_trie, closed_trie, endings
+from placerec.lm.vocabulary import Vocabulary
 
 
 @settings(max_examples=50, deadline=None)

@@ -15,7 +15,7 @@ from helpers.small_world import PLACES, VOCABULARY, run_through
 
 from placerec.errors import LanguageModelError, ModelError, OutputError, SourceError
 from placerec.lm import SMOOTHINGS, count_ngrams, format_counts, read_arpa
-from placerec.lm.external import kenlm_scorer
+from placerec.lm.check import kenlm_scorer
 from placerec.model import ModelOptions, estimate_place, parse_min_count, train_model
 from placerec.model.record import LearnedSequence, Record
 from placerec.version import __version__

@@ -28,7 +28,7 @@ def little_memory() -> Iterator[None]:
         patch("placerec.srilm.text.BLOCK", 4),
         patch("placerec.lm.stored_text.BLOCK", 8),
         patch("placerec.lm.stored_text.IN_MEMORY", 8),
-        patch("placerec.lm.windows.WAITING", 4),
+        patch("placerec.lm.stored_text.WAITING", 4),
     ):
         yield
 

@@ -8,8 +8,7 @@ import pytest
 
 from placerec.errors import LanguageModelError, MissingExtraError
 from placerec.lm import SMOOTHINGS, count_ngrams, estimate, read_arpa, smoothing, with_unigrams, write_arpa
-from placerec.lm.check import check_model, generated_stream
-from placerec.lm.external import kenlm_scorer
+from placerec.lm.check import check_model, generated_stream, kenlm_scorer
 from placerec.lm.score import Contexts
 
 WORDS = [f"w{i:02d}" for i in range(30)]
