@@ -20,7 +20,7 @@ from placerec.files import all_lines
 from placerec.lm.row_index import RowIndex
 from placerec.lm.stored_text import BLOCK, Block, Numbers, StoredText, changes, distinct_windows
 from placerec.lm.trie import Trie, build_trie, endings, per_context
-from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN, Vocabulary
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN, Vocabulary, add_markers, find_markers
 
 if TYPE_CHECKING:
     from placerec.jobs import Executor
@@ -74,27 +74,31 @@ def count_ngrams(
 def numbered(
     sentences: Iterable[Sequence[str]], number: Callable[[str], int], markers: bool
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Sentences as word numbers (T,) and lengths (S,), in pieces of BLOCK words or a little more; one at least."""
+    """Sentences as word numbers (T,) and lengths (S,), in pieces of BLOCK words or a little more; one at least.
+
+    With `markers`, sentences that are not empty get `<s>` and `</s>` where they lack them.
+    """
+    start, end = number(SENTENCE_START), number(SENTENCE_END)
+
+    def piece() -> tuple[Ints, Ints]:
+        ids, sizes = np.array(tokens, np.int64), np.array(lengths, np.int64)
+        opened, ended = find_markers(ids, sizes, start, end)
+        marked = (sizes > 0) & markers
+        return add_markers(ids, sizes, start, end, marked & ~opened, marked & ~ended)
+
     tokens: list[int] = []
     lengths: list[int] = []
     for sentence in sentences:
-        words = _marked(sentence) if markers else sentence
-        tokens.extend(map(number, words))
-        lengths.append(len(words))
+        tokens.extend(map(number, sentence))
+        lengths.append(len(sentence))
         if len(tokens) >= BLOCK:
-            yield np.array(tokens, np.int64), np.array(lengths, np.int64)
+            yield piece()
             tokens, lengths = [], []
-    yield np.array(tokens, np.int64), np.array(lengths, np.int64)
+    yield piece()
 
 
 def _listed(numbers: Mapping[str, int], word: str) -> int:
     return numbers.get(word, 0)
-
-
-def _marked(sentence: Sequence[str]) -> list[str]:
-    start = [] if sentence and sentence[0] == SENTENCE_START else [SENTENCE_START]
-    end = [] if sentence and sentence[-1] == SENTENCE_END else [SENTENCE_END]
-    return [*start, *sentence, *end] if sentence else []
 
 
 def count_text(

@@ -36,3 +36,31 @@ class Vocabulary:
         mask = np.zeros(len(self), bool)
         mask[[self.index[word] for word in words if word in self.index]] = True
         return mask
+
+
+def find_markers(numbers: Ints, lengths: Ints, start: int, end: int) -> tuple[Mask, Mask]:
+    """Which sentences of word numbers (T,) and lengths (S,) begin with `start`, and which end with `end`: bool (S,)."""
+    stops = np.cumsum(lengths)
+    some = lengths > 0
+    opened, ended = np.zeros(len(lengths), bool), np.zeros(len(lengths), bool)
+    opened[some] = numbers[(stops - lengths)[some]] == start
+    ended[some] = numbers[(stops - 1)[some]] == end
+    return opened, ended
+
+
+def add_markers(numbers: Ints, lengths: Ints, start: int, end: int, before: Mask, after: Mask) -> tuple[Ints, Ints]:
+    """Word numbers and lengths of sentences with `start` put before some, and `end` behind some.
+
+    `before`, `after`: which sentences, bool (S,).
+    """
+    if not (before | after).any():
+        return numbers, lengths
+    whole = lengths + before + after
+    stops = np.cumsum(whole)
+    marked = np.empty(int(whole.sum()), np.int64)
+    first, last = (stops - whole)[before], (stops - 1)[after]
+    given = np.ones(len(marked), bool)
+    given[first] = given[last] = False
+    marked[given] = numbers
+    marked[first], marked[last] = start, end
+    return marked, whole

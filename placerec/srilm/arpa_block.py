@@ -12,10 +12,12 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LOG_ZERO
-from placerec.srilm.fields import LONGEST_NAME, Fields, Packed, split_lines, with_odd_bytes
+from placerec.srilm.fields import Fields, Packed, split_lines, with_odd_bytes
 
 # So many numbers are sooner converted one by one.
 _FEW = 200
+# Bytes of numbers that are taken apart many at a time.
+_LONGEST = 16
 _NUMBER = re.compile(rb"-?\d+(\.\d*)?([eE][-+]?\d+)?")
 
 
@@ -130,14 +132,14 @@ def _eight_digits(text: Packed, filled: Packed) -> tuple[Packed, Mask]:
 
 def _decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     """Plain decimal numbers of up to 15 digits, correctly rounded, and which of the fields are that."""
-    low, high = fields.packed(at)
+    low, high = fields.packed(at, 2)
     length = fields.lengths[at]
     digits = np.zeros(len(at), np.int64)
     behind = np.zeros(len(at), np.int64)
     points = np.zeros(len(at), np.int64)
     negative = (low & np.uint64(255)) == _SIGN
-    plain = length <= LONGEST_NAME
-    for j in range(min(LONGEST_NAME, int(length.max(initial=0)))):
+    plain = length <= _LONGEST
+    for j in range(min(_LONGEST, int(length.max(initial=0)))):
         byte = ((low if j < 8 else high) >> np.uint64(8 * (j % 8)) & np.uint64(255)).astype(np.int64)
         point = byte == _POINT
         digit = byte - ord("0")
@@ -152,4 +154,4 @@ def _decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     return np.where(negative, -value, value), plain
 
 
-_TENS = 10.0 ** np.arange(LONGEST_NAME + 1)
+_TENS = 10.0 ** np.arange(_LONGEST + 1)

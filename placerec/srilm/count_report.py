@@ -52,8 +52,7 @@ def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting
         if count is None:
             printer.streams.say(f"{lines.position}{MALFORMED}")
         elif len(found) - 1 <= counting.order:
-            unknown = printer.words.index[printer.words.unknown]
-            ngram = tuple(printer.words.index.get(printer.words.normal(word), unknown) for word in found[:-1])
+            ngram = tuple(printer.words.known(word) for word in found[:-1])
             table[ngram] = table.get(ngram, 0) + count
     _add(total, _group(table, scorer, printer, counting, shown=grouped or printer.debug >= 1))
     ranks = total.ranks if printer.debug >= RANKS else None

@@ -1,17 +1,19 @@
 """The fields of many lines at once, and the numbers of the words among them."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.arrays import Ints
+from placerec.arrays import Ints, Mask
 from placerec.lm.row_index import RowIndex
 
 Packed = NDArray[np.uint64]
-SHORT_NAME, LONGEST_NAME = 8, 16
-_PADDING = bytes(24)
+_EIGHT = 8
+# Names of so many bytes are compared as numbers; longer ones are left to a dictionary.
+LONGEST_NAME = 64
+_PADDING = bytes(LONGEST_NAME + _EIGHT)
 _ODD_BYTES = (b"\0", b"\v", b"\f")
 _TAB, _LINE_END, _RETURN, _BLANK = b"\t\n\r "
 _COMMENT = np.uint64(int.from_bytes(b"##", "little"))
@@ -19,7 +21,8 @@ _COMMENT = np.uint64(int.from_bytes(b"##", "little"))
 _HOLE = np.uint64(0)
 _TWO_BYTES = np.uint64(0xFFFF)
 # The bytes of a number that a field of so many bytes fills.
-_FILLED = np.array([(1 << 8 * size) - 1 for size in range(SHORT_NAME + 1)], np.uint64)
+_FILLED = np.array([(1 << 8 * size) - 1 for size in range(_EIGHT + 1)], np.uint64)
+_SPREAD = np.array([0x9E3779B97F4A7C15 * (2 * i + 1) % 2**64 for i in range(LONGEST_NAME // _EIGHT)], np.uint64)
 
 
 def with_odd_bytes(data: bytes) -> bool:
@@ -27,21 +30,13 @@ def with_odd_bytes(data: bytes) -> bool:
     return any(odd in data for odd in _ODD_BYTES)
 
 
-def unusual(data: bytes) -> bool:
-    """Whether lines hold such bytes, or comments: they go line by line."""
-    # One byte is found much faster than several.
-    return with_odd_bytes(data) or (b"#" in data and (data.startswith(b"##") or b"\n##" in data))
-
-
-def usual_blocks(
-    blocks: Iterable[bytes], is_unusual: Callable[[bytes], bool], unusual_one: list[bytes]
-) -> Iterator[bytes]:
-    """The blocks before the first unusual one, which is handed back, each with a line end."""
+def usual_blocks(blocks: Iterable[bytes], odd_one: list[bytes]) -> Iterator[bytes]:
+    """The blocks before the first one with odd bytes, which is handed back."""
     for block in blocks:
-        if is_unusual(block):
-            unusual_one.append(block)
+        if with_odd_bytes(block):
+            odd_one.append(block)
             return
-        yield block if block.endswith(b"\n") else block + b"\n"
+        yield block
 
 
 class Fields:
@@ -63,12 +58,13 @@ class Fields:
         # Copied, as it is aligned then: that pays where most places are asked for.
         return np.concatenate([_eights(self.data, inside), _eights(end, len(end) - 7)])
 
-    def packed(self, at: Ints) -> tuple[Packed, Packed]:
-        """The first 16 bytes of the fields `at` as two numbers each."""
+    def packed(self, at: Ints, numbers: int) -> list[Packed]:
+        """The first bytes of the fields `at` as so many numbers each, eight bytes in a number."""
         start, length = self.starts[at], self.lengths[at]
-        low = self.eights[start] & _FILLED[np.minimum(length, SHORT_NAME)]
-        high = self.eights[start + SHORT_NAME] & _FILLED[np.clip(length - SHORT_NAME, 0, SHORT_NAME)]
-        return low, high
+        return [
+            self.eights[start + place] & _FILLED[np.clip(length - place, 0, _EIGHT)]
+            for place in range(0, _EIGHT * numbers, _EIGHT)
+        ]
 
 
 def _eights(data: bytes, places: int) -> Packed:
@@ -106,38 +102,46 @@ def _any_blanks(data: bytes, buffer: NDArray[np.uint8]) -> tuple[Fields, Ints]:
     return Fields(data, starts, stops - starts), np.diff(through, prepend=0)
 
 
-def without_comments(fields: Fields, count: Ints) -> tuple[Fields, Ints]:
-    """The same without the fields of lines that start with ##."""
+def comments(fields: Fields, count: Ints) -> Mask:
+    """Which of the lines, with `count` fields each, start with ##: bool (l,)."""
+    commented = np.zeros(len(count), bool)
     begin = (np.cumsum(count) - count)[count > 0]
     start = fields.starts[begin]
     comment = fields.eights[start] & _TWO_BYTES == _COMMENT
-    if not comment.any():
+    if comment.any():
+        comment &= (start == 0) | (np.frombuffer(fields.data, np.uint8)[start - 1] == _LINE_END)
+        commented[count > 0] = comment
+    return commented
+
+
+def without_lines(fields: Fields, count: Ints, left_out: Mask) -> tuple[Fields, Ints]:
+    """The fields of the lines that are not left out, and how many there are in each line, 0 where it is left out."""
+    if not left_out.any():
         return fields, count
-    buffer = np.frombuffer(fields.data, np.uint8)
-    comment &= (start == 0) | (buffer[start - 1] == _LINE_END)
-    commented = np.zeros(len(count), bool)
-    commented[count > 0] = comment
-    kept = ~np.repeat(commented, count)
-    return Fields(fields.data, fields.starts[kept], fields.lengths[kept]), np.where(commented, 0, count)
+    kept = ~np.repeat(left_out, count)
+    return Fields(fields.data, fields.starts[kept], fields.lengths[kept]), np.where(left_out, 0, count)
 
 
 class NameTable:
-    """Word numbers by name, for many names at once: those of up to 8 or 16 bytes as one or two numbers."""
+    """Word numbers by name, for many names at once: those of up to LONGEST_NAME bytes as numbers of eight bytes."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self.index = index
         self.size = len(index)
-        packed = np.array([name.encode("latin-1") for name in index], f"S{LONGEST_NAME}").view("<u8").reshape(-1, 2)
-        length = np.fromiter(map(len, index), np.int64, self.size)
+        names = [name.encode("latin-1") for name in index]
+        length = np.fromiter(map(len, names), np.int64, self.size)
         numbers = np.fromiter(index.values(), np.int64, self.size)
+        first = np.array(names, f"S{_EIGHT}").view("<u8")
         # Longer names leave a hole, so that in most lists a name's place is its number.
-        self.short = RowIndex(np.where(length <= SHORT_NAME, packed[:, 0], _HOLE).view(np.int64))
+        self.short = RowIndex(np.where(length <= _EIGHT, first, _HOLE).view(np.int64))
         self.short_numbers = None if (numbers == np.arange(self.size)).all() else np.append(numbers, -1)
-        long = (length > SHORT_NAME) & (length <= LONGEST_NAME)
-        self.halves = RowIndex(packed[long].ravel().view(np.int64))
-        self.long = RowIndex(self._pairs(packed[long, 0], packed[long, 1]))
+        long = np.flatnonzero((length > _EIGHT) & (length <= LONGEST_NAME))
+        self.width = max(1, -(-int(length[long].max(initial=0)) // _EIGHT))
         # At the end, what is found for a name that is not listed.
+        packed = np.array([*(names[i] for i in long.tolist()), b""], f"S{_EIGHT * self.width}")
+        self.long_names = list(packed.view("<u8").reshape(-1, self.width).T.copy())
         self.long_numbers = np.append(numbers[long], -1)
+        self.long = RowIndex(_mixed(self.long_names))
 
     def find(self, fields: Fields, at: Ints | slice) -> Ints:
         """The numbers of the fields `at` (m,), -1 for a name that is not listed."""
@@ -148,18 +152,30 @@ class NameTable:
         number = self.short.find(name.view(np.int64))
         if self.short_numbers is not None:
             number = self.short_numbers.take(number, mode="wrap")
-        if length.max(initial=0) > SHORT_NAME:
-            long = np.flatnonzero(length > SHORT_NAME)
+        if length.max(initial=0) > _EIGHT:
+            long = np.flatnonzero(length > _EIGHT)
             number[long] = self._find_long(fields, np.arange(len(fields.starts))[at][long])
         return number
 
     def _find_long(self, fields: Fields, at: Ints) -> Ints:
-        number = self.long_numbers[self.long.find(self._pairs(*fields.packed(at)))]
-        for i in np.flatnonzero(fields.lengths[at] > LONGEST_NAME).tolist():
+        length = fields.lengths[at]
+        wanted = fields.packed(at, self.width)
+        place = self.long.find(_mixed(wanted))
+        place[length > _EIGHT * self.width] = -1
+        same = place >= 0
+        for names, name in zip(self.long_names, wanted, strict=True):
+            same &= names[place] == name
+        number = np.where(same, self.long_numbers[place], -1)
+        # What differs from the name found may be another one with the same mixture.
+        for i in np.flatnonzero((same != (place >= 0)) | (length > LONGEST_NAME)).tolist():
             number[i] = self.index.get(fields.text(int(at[i])).decode("latin-1"), -1)
         return number
 
-    def _pairs(self, low: Packed, high: Packed) -> Ints:
-        """One number for two halves of names; one that is no name's if either is none's."""
-        first, second = self.halves.find(low.view(np.int64)), self.halves.find(high.view(np.int64))
-        return np.where(first < 0, -1, (first << np.int64(32)) + second + 1)
+
+def _mixed(columns: Sequence[Packed]) -> Ints:
+    """One number for the numbers of each name: rarely that of another name."""
+    mixed = columns[0] * _SPREAD[0]
+    for column, spread in zip(columns[1:], _SPREAD[1:], strict=False):
+        mixed += column * spread
+    numbers: Ints = mixed.view(np.int64)
+    return numbers

@@ -7,11 +7,11 @@ import numpy as np
 
 from placerec.arrays import Ints
 from placerec.lm.counts import NgramCounts
+from placerec.lm.stored_text import StoredText
 from placerec.lm.trie import Trie
 from placerec.lm.vocabulary import Vocabulary
 from placerec.srilm.counts_file import Table
 from placerec.srilm.hashing import first_positions, walk_order
-from placerec.srilm.text import Text
 from placerec.srilm.vocabulary import WordList
 
 
@@ -20,7 +20,7 @@ class FirstSeen:
     """Where all n-grams came from: counts files in the order of reading, then the text."""
 
     tables: Sequence[Table]
-    text: Text | None
+    text: StoredText | None
     words: WordList
 
     def positions(self, trie: Trie) -> list[Ints]:
@@ -38,7 +38,7 @@ class FirstSeen:
                     first[n - 1][row] = np.minimum(first[n - 1][row], now)
                 now += 1
         if self.text is not None:
-            for n, its in enumerate(first_positions(self.text.stored, trie, sorted_number)):
+            for n, its in enumerate(first_positions(self.text, trie, sorted_number)):
                 first[n] = np.minimum(first[n], np.where(its < never - now, its + now, never))
         return first
 

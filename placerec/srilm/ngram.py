@@ -139,7 +139,7 @@ class _Run:
 
         options, index = self.options, self.words.index
         rng = np.random.Generator(np.random.PCG64(None if options["seed"] is None else abs(options["seed"])))
-        start, end, unknown = index[SENTENCE_START], index[SENTENCE_END], index[self.words.unknown]
+        start, end = index[SENTENCE_START], index[SENTENCE_END]
         events = event_mask(self.words)
 
         def spread(history: Sequence[int]) -> Singles:
@@ -150,7 +150,7 @@ class _Run:
 
         prefixes = map(tokens, self.streams.lines(options["gen-prefixes"])) if options["gen-prefixes"] else [[]]
         for prefix in prefixes:
-            known = [index.get(self.words.normal(word), unknown) for word in prefix]
+            known = [self.words.known(word) for word in prefix]
             opening = [] if options["no-sos"] or known[:1] == [start] else [start]
             for _ in range(options["gen"]):
                 drawn = generate(spread, [*opening, *known], end, rng, order=self.order)

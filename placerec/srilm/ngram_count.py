@@ -1,22 +1,24 @@
 """`ngram-count`: text and counts in, counts, vocabularies and language models out (sections 2 to 7)."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from placerec.lm.arpa import arpa_blocks
-from placerec.lm.counts import NgramCounts, add_counts, format_counts, recomputed
+from placerec.lm.counts import NgramCounts, add_counts, count_text, format_counts, recomputed
 from placerec.lm.discounts import Rule
 from placerec.lm.estimation import estimate_mutable
 from placerec.lm.mutable import insert_prefixes
 from placerec.lm.prune import prune
-from placerec.srilm.counts_file import Table, read_counts
+from placerec.lm.stored_text import StoredText
+from placerec.srilm.counts_file import Table, parse_count, read_counts
 from placerec.srilm.discounting import MODIFYING, Fitter, choose, given_method, meta_occurrences
 from placerec.srilm.estimation_messages import EstimationMessages
 from placerec.srilm.first_seen import FirstSeen
 from placerec.srilm.options import Option, Options, Parsed, parse
+from placerec.srilm.sentences import Handling, mark, read_sentences
 from placerec.srilm.streams import SrilmError, Streams, exit_status
-from placerec.srilm.text import Marking, Text, read_text
 from placerec.srilm.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
 
 TOOL = "ngram-count"
@@ -147,7 +149,9 @@ def _read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[Ngram
         text = _read_text(options, words, streams)
     parts = [table.count(max(1, order), words, fractional=fractional) for table in tables]
     if text is not None and order > 0:
-        parts.append(text.count(order, words, fractional=fractional))
+        vocabulary, renumbered = words.sorted()
+        numbers = np.array(renumbered, np.int64)
+        parts.append(count_text(text, order, vocabulary, renumbered=numbers, fractional=fractional))
     if not parts:
         parts.append(Table().count(max(1, order), words, fractional=fractional))
     counts = parts[0] if len(parts) == 1 else add_counts(*parts)
@@ -156,15 +160,30 @@ def _read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[Ngram
     return counts, FirstSeen(tables, text, words)
 
 
-def _read_text(options: Parsed, words: WordList, streams: Streams) -> Text:
-    weight = "last" if options["text-has-weights-last"] else "first" if options["text-has-weights"] else ""
-    marking = Marking(not options["no-sos"], not options["no-eos"], weight, options["float-counts"])
-    text = read_text(options["text"], words, marking, streams)
+def _read_text(options: Parsed, words: WordList, streams: Streams) -> StoredText:
+    """The sentences of the text with their markers, as SRILM's word numbers; with -debug 1, how many are told."""
+    handling = Handling(
+        start=not options["no-sos"],
+        end=not options["no-eos"],
+        adding=True,
+        weight="last" if options["text-has-weights-last"] else "first" if options["text-has-weights"] else "",
+        parse_weight=partial(parse_count, fractional=options["float-counts"]),
+        too_long="line too long?",
+    )
+    text = StoredText()
+    lines = streams.lines(options["text"])
+    sentences = found = unknown = 0
+    for part in read_sentences(lines, words, handling):
+        marked = mark(part, words, handling)
+        sentences += len(part.lengths)
+        found += int((marked.lengths - marked.opened - marked.ended).sum())
+        unknown += int((part.numbers == words.index.get(words.unknown, -1)).sum())
+        if len(part.lengths):
+            text.add(marked.numbers, marked.lengths, part.weights if handling.weight else None)
     if options["debug"] >= 1:
-        said = f"{text.sentences} sentences, {text.words} words, {text.unknown} OOVs"
-        streams.say(f"{options['text']}: line {text.lines}: {said}")
-        if text.words + text.sentences > 0:
-            streams.say("0 zeroprobs, logprob= 0 ppl= 1 ppl1= " + ("1" if text.words else "undefined"))
+        streams.say(f"{lines.position}{sentences} sentences, {found} words, {unknown} OOVs")
+        if found + sentences > 0:
+            streams.say("0 zeroprobs, logprob= 0 ppl= 1 ppl1= " + ("1" if found else "undefined"))
     return text
 
 

@@ -10,8 +10,9 @@ from placerec.arrays import Floats, Ints, Mask
 from placerec.lm.logs import p_of
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
 from placerec.lm.score import TokenSequence
+from placerec.lm.vocabulary import SENTENCE_END
 from placerec.srilm.scorers import Scored, Scorer, View, event_numbers
-from placerec.srilm.sentences import Handling, Sentences, joined, mark, read_sentences
+from placerec.srilm.sentences import Handling, Marked, Sentences, joined, mark, read_sentences
 from placerec.srilm.streams import Streams
 from placerec.srilm.vocabulary import WordList
 
@@ -90,19 +91,22 @@ class Printer:
 
 def print_perplexity(name: str, scorer: Scorer, printer: Printer, handling: Handling, *, whole: bool) -> None:
     """`-ppl`: score a text and print what `printer.debug` asks for; `whole`: in one go (a cache runs on and on)."""
-    parts = read_sentences(name, printer.words, handling, printer.streams)
+    parts = read_sentences(printer.streams.lines(name), printer.words, handling)
     if whole:
         parts = iter([joined(list(parts))])
     summary = _Summary(printer)
     for sentences in parts:
-        summary.add(sentences, *_score(scorer, printer, sentences, *mark(sentences, printer.words, handling)))
+        summary.add(sentences, *_score(scorer, printer, sentences, mark(sentences, printer.words, handling)))
     summary.finish(name)
 
 
-def _score(
-    scorer: Scorer, printer: Printer, sentences: Sentences, sequence: TokenSequence, lengths: Ints, ended: Mask
-) -> tuple[Floats, list["_Line"]]:
+def _score(scorer: Scorer, printer: Printer, sentences: Sentences, marked: Marked) -> tuple[Floats, list["_Line"]]:
     """The totals of each sentence (S, 5), and what there is to print about its words."""
+    sequence, lengths = _sequence(marked), marked.lengths
+    ended = np.zeros(len(lengths), bool)
+    predicted = lengths - marked.opened > 0
+    last = sequence.ids[(np.cumsum(lengths) - 1)[predicted]]
+    ended[predicted] = last == printer.words.index.get(SENTENCE_END, -1)
     view = scorer.view(sequence)
     scored = view.score()
     unknown = sequence.ids == printer.words.index[printer.words.unknown]
@@ -110,6 +114,15 @@ def _score(
     if printer.debug < TOKENS:
         return totals, [_Line() for _ in ended] if printer.debug else []
     return totals, _token_lines(printer, view, scored, _Batch(sequence, lengths, ended, sentences.weights))
+
+
+def _sequence(marked: Marked) -> TokenSequence:
+    """What is to be scored: all words but <s> at the beginning of sentences."""
+    begin, some = np.cumsum(marked.lengths) - marked.lengths, marked.lengths > 0
+    first, scored = np.zeros(len(marked.numbers), bool), np.ones(len(marked.numbers), bool)
+    first[begin[some]] = True
+    scored[begin[some & marked.opened]] = False
+    return TokenSequence(marked.numbers, first, scored)
 
 
 class _Batch(NamedTuple):

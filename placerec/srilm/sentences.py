@@ -1,6 +1,9 @@
-"""The text that `ngram -ppl` scores: lines to word numbers, with the markers that belong around them (section 10.1)."""
+"""Running text: lines to word numbers, and the markers around sentences (sections 4.1 and 10.1 of our specification).
 
-from collections.abc import Iterable, Iterator, Sequence
+Lines are taken many at a time; line by line from where the first NUL, VT or FF is, and where more than words is asked.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from io import BytesIO
 from itertools import chain
 from typing import NamedTuple
@@ -8,32 +11,38 @@ from typing import NamedTuple
 import numpy as np
 
 from placerec.ahead import make_ahead
-from placerec.arrays import Floats, Ints, Mask
-from placerec.lm.score import TokenSequence
-from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
-from placerec.srilm.fields import NameTable, split_lines, usual_blocks, with_odd_bytes, without_comments
+from placerec.arrays import Ints, Mask
+from placerec.lm.stored_text import Numbers
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, add_markers, find_markers
+from placerec.srilm.fields import Fields, NameTable, comments, split_lines, usual_blocks, without_lines
 from placerec.srilm.options import leading_float
-from placerec.srilm.streams import Lines, Streams, tokens
+from placerec.srilm.streams import Lines, tokens
 from placerec.srilm.vocabulary import WordList
 
 LONGEST = 50000
 # Bytes read at once where lines are as programs write them, and words where they are not.
 _BLOCK, _BATCH = 1 << 19, 1 << 18
+_MANY = 1000
 
 
 class Handling(NamedTuple):
     """What is done to sentences: which markers are put around them, words that are left out, and more.
 
-    `weight`: where a line's weight stands (`first`, `last`, or nowhere); `escape`: the start of lines that are copied;
-    `verbose`: keep the lines' words as they are; `noise`: numbers of words that are left out.
+    `adding`: words that are not listed are added to the word list; otherwise they are the unknown word. `weight`: where
+    a line's weight stands (`first`, `last`, or nowhere), which `parse_weight` reads, giving None for what is none;
+    `too_long`: what is said of a line of more than LONGEST words, which is left out. `escape`: the start of lines that
+    are copied; `verbose`: keep the lines' words as they are; `noise`: numbers of words that are left out.
     """
 
     start: bool = True
     end: bool = True
-    reverse: bool = False
+    adding: bool = False
     weight: str = ""
+    parse_weight: Callable[[str], float | None] = leading_float
+    too_long: str = "too many words per sentence"
     escape: str | None = None
     verbose: bool = False
+    reverse: bool = False
     noise: frozenset[int] = frozenset()
 
 
@@ -45,48 +54,67 @@ class Sentences(NamedTuple):
 
     numbers: Ints
     lengths: Ints
-    weights: Floats
+    weights: Numbers
     shown: Sequence[str] = ()
     escapes: Sequence[tuple[int, str]] = ()
 
 
-def read_sentences(name: str, words: WordList, handling: Handling, streams: Streams) -> Iterator[Sentences]:
-    """Read a text, many lines at a time; words that are not listed are the unknown word.
-
-    Too long lines are reported and left out.
-    """
-    lines = streams.lines(name)
+def read_sentences(lines: Lines, words: WordList, handling: Handling) -> Iterator[Sentences]:
+    """The sentences of a text, many at a time; lines that cannot be used are reported and left out."""
     blocks = lines.blocks(_BLOCK)
     if not (handling.weight or handling.escape is not None or handling.verbose):
-        careful: list[bytes] = []
+        odd: list[bytes] = []
         # Nothing else is said meanwhile, so that messages keep their order.
-        yield from make_ahead(_read_quickly(lines, usual_blocks(blocks, with_odd_bytes, careful), words, streams))
-        if not careful:
+        yield from make_ahead(_read_quickly(lines, usual_blocks(blocks, odd), words, handling))
+        if not odd:
             return
-        blocks = chain(careful, blocks)
-    yield from _read_carefully(lines, blocks, words, handling, streams)
+        blocks = chain(odd, blocks)
+    yield from _read_carefully(lines, blocks, words, handling)
 
 
-def _read_quickly(lines: Lines, blocks: Iterable[bytes], words: WordList, streams: Streams) -> Iterator[Sentences]:
-    names = NameTable(words.index)
+def _read_quickly(lines: Lines, blocks: Iterable[bytes], words: WordList, handling: Handling) -> Iterator[Sentences]:
+    numbering = _Numbering(words, handling.adding)
     for block in blocks:
-        fields, lengths = without_comments(*split_lines(block.lower() if words.lower else block))
-        numbers = names.find(fields, slice(None))
-        numbers[numbers < 0] = words.index[words.unknown]
-        too_long = lengths > LONGEST
-        if too_long.any():
-            for number in np.flatnonzero(too_long).tolist():
-                streams.say(f"{lines.name}: line {lines.number + number + 1}: too many words per sentence")
-            numbers, lengths = numbers[~np.repeat(too_long, lengths)], np.where(too_long, 0, lengths)
+        fields, lengths = split_lines(block.lower() if words.lower else block)
+        comment = comments(fields, lengths)
+        too_long = (lengths > LONGEST) & ~comment
+        for number in np.flatnonzero(too_long).tolist():
+            lines.streams.say(f"{lines.name}: line {lines.number + number + 1}: {handling.too_long}")
+        fields, lengths = without_lines(fields, lengths, comment | too_long)
         lines.number += len(lengths)
         used = lengths[lengths > 0]
-        yield Sentences(numbers, used, np.ones(len(used)))
+        yield Sentences(numbering.numbers(fields), used, np.ones(len(used)))
 
 
-def _read_carefully(
-    lines: Lines, blocks: Iterable[bytes], words: WordList, handling: Handling, streams: Streams
-) -> Iterator[Sentences]:
-    index, unknown = words.index, words.index[words.unknown]
+class _Numbering:
+    """Numbers the words of a text, many at a time."""
+
+    def __init__(self, words: WordList, adding: bool) -> None:
+        self.words, self.adding = words, adding
+        self.names = NameTable(words.index)
+        self.asked = 0
+
+    def numbers(self, fields: Fields) -> Ints:
+        """The numbers of words (T,); new ones are added in order of occurrence."""
+        numbers = self.names.find(fields, slice(None))
+        missing = np.flatnonzero(numbers < 0)
+        if not self.adding or self.words.closed:
+            numbers[missing] = self.words.index[self.words.unknown]
+            return numbers
+        while len(missing):
+            now, missing = np.split(missing, [max(_MANY, self.names.size // 2)])
+            numbers[now] = [self.words.number(fields.text(i).decode("latin-1")) for i in now.tolist()]
+            self.asked += len(now)
+            # Asking one by one has taken about as long as a new table takes.
+            if self.asked > self.names.size // 2:
+                self.names, self.asked = NameTable(self.words.index), 0
+                numbers[missing] = self.names.find(fields, missing)
+                missing = missing[numbers[missing] < 0]
+        return numbers
+
+
+def _read_carefully(lines: Lines, blocks: Iterable[bytes], words: WordList, handling: Handling) -> Iterator[Sentences]:
+    number = words.number if handling.adding else words.known
     numbers: list[int] = []
     kept: list[tuple[int, float, str]] = []
     escapes: list[tuple[int, str]] = []
@@ -98,13 +126,15 @@ def _read_carefully(
             escapes.append((len(kept), line))
             continue
         found = tokens(line)
-        weight = leading_float(found.pop(0 if handling.weight == "first" else -1)) if handling.weight and found else 1.0
-        if len(found) > LONGEST:
-            streams.say(f"{lines.position}too many words per sentence")
-        elif weight is None:
-            streams.say(f"{lines.position}illegal count weight or line too long?")
+        weight: float | None = 1.0
+        if handling.weight:
+            weight = handling.parse_weight(found.pop(0 if handling.weight == "first" else -1))
+        if weight is None:
+            lines.streams.say(f"{lines.position}illegal count weight or line too long?")
+        elif len(found) > LONGEST:
+            lines.streams.say(f"{lines.position}{handling.too_long}")
         else:
-            numbers += [index.get(words.normal(word), unknown) for word in found]
+            numbers += map(number, found)
             mark = f"{weight:g}* " if handling.weight else ""
             kept.append((len(found), weight, mark + " ".join(found) if handling.verbose else ""))
     yield _sentences(numbers, kept, escapes)
@@ -114,9 +144,7 @@ def _sentences(
     numbers: Sequence[int], kept: Sequence[tuple[int, float, str]], escapes: Sequence[tuple[int, str]]
 ) -> Sentences:
     lengths, weights, shown = zip(*kept, strict=True) if kept else ((), (), ())
-    return Sentences(
-        np.array(numbers, np.int64), np.array(lengths, np.int64), np.array(weights, np.float64), shown, escapes
-    )
+    return Sentences(np.array(numbers, np.int64), np.array(lengths, np.int64), np.array(weights), shown, escapes)
 
 
 def joined(parts: Sequence[Sentences]) -> Sentences:
@@ -129,38 +157,28 @@ def joined(parts: Sequence[Sentences]) -> Sentences:
     return Sentences(numbers, lengths, weights, shown, escapes)
 
 
-def mark(sentences: Sentences, words: WordList, handling: Handling) -> tuple[TokenSequence, Ints, Mask]:
-    """The token sequence to score, the lengths of its sentences (S,), and whether each of them ends in </s> (S,)."""
-    start_number, end_number = words.index.get(SENTENCE_START, -1), words.index.get(SENTENCE_END, -1)
-    numbers, size = sentences.numbers, len(sentences.lengths)
-    stops = np.cumsum(sentences.lengths)
-    some = sentences.lengths > 0
-    opened, ended = np.zeros(size, bool), np.zeros(size, bool)
-    opened[some] = numbers[(stops - sentences.lengths)[some]] == start_number
-    ended[some] = numbers[(stops - 1)[some]] == end_number
-    lengths = sentences.lengths
+class Marked(NamedTuple):
+    """Sentences with their markers: word numbers (T,), lengths (S,); which begin with <s>, and end with </s>, (S,)."""
+
+    numbers: Ints
+    lengths: Ints
+    opened: Mask
+    ended: Mask
+
+
+def mark(sentences: Sentences, words: WordList, handling: Handling) -> Marked:
+    """Put the markers around sentences that they lack; words that are noise go, after the markers are looked for."""
+    start, end = words.index.get(SENTENCE_START, -1), words.index.get(SENTENCE_END, -1)
+    numbers, lengths, size = sentences.numbers, sentences.lengths, len(sentences.lengths)
+    opened, ended = find_markers(numbers, lengths, start, end)
     if handling.noise and (noise := np.isin(numbers, list(handling.noise))).any():
         lengths = np.bincount(np.repeat(np.arange(size), lengths)[~noise], minlength=size)
         numbers = numbers[~noise]
     if handling.reverse:
         numbers = _reversed(numbers, lengths, opened, ended)
-    before, after = (~opened & handling.start).astype(np.int64), (~ended & handling.end).astype(np.int64)
-    whole = lengths + before + after
-    begin = np.cumsum(whole) - whole
-    ids = np.empty(int(whole.sum()), np.int64)
-    inner = np.ones(len(ids), bool)
-    inner[begin[before > 0]] = False
-    inner[(begin + whole - 1)[after > 0]] = False
-    ids[begin[before > 0]] = start_number
-    ids[(begin + whole - 1)[after > 0]] = end_number
-    ids[inner] = numbers
-    first, scored = np.zeros(len(ids), bool), np.ones(len(ids), bool)
-    first[begin[whole > 0]] = True
-    scored[begin[(whole > 0) & (opened | (before > 0))]] = False
-    has_end = np.zeros(size, bool)
-    predicted = whole - (opened | (before > 0)) > 0
-    has_end[predicted] = ids[(begin + whole - 1)[predicted]] == end_number
-    return TokenSequence(ids, first, scored), whole, has_end
+    before, after = ~opened & handling.start, ~ended & handling.end
+    numbers, lengths = add_markers(numbers, lengths, start, end, before, after)
+    return Marked(numbers, lengths, opened | before, ended | after)
 
 
 def _reversed(numbers: Ints, lengths: Ints, opened: Mask, ended: Mask) -> Ints:

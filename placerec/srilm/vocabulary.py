@@ -44,8 +44,10 @@ class WordList:
 
     def number(self, word: str) -> int:
         """The number of a word of a text or counts file: added if the vocabulary is open, else the unknown word's."""
-        if not self.closed:
-            return self.add(word)
+        return self.known(word) if self.closed else self.add(word)
+
+    def known(self, word: str) -> int:
+        """The number of a word, the unknown word's if it is not listed."""
         return self.index.get(self.normal(word), self.index[self.unknown])
 
     def is_meta(self, word: str) -> bool:

@@ -6,18 +6,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.srilm import arpa_block
-from placerec.srilm.fields import Fields, NameTable, split_lines, unusual, with_odd_bytes, without_comments
+from placerec.srilm import fields as fields_module
+from placerec.srilm.fields import Fields, NameTable, comments, split_lines, with_odd_bytes, without_lines
 from placerec.srilm.streams import tokens
 
 lines = st.lists(st.text("ab#\t \r\x01\xe9", max_size=8), max_size=6)
-names = st.text("abc", min_size=1, max_size=20)
+names = st.text("abc", min_size=1, max_size=20) | st.sampled_from(["a" * size for size in (8, 16, 63, 64, 65, 80)])
 
 
-def fields_of(text: str, *, comments: bool = True) -> list[list[str]]:
+def fields_of(text: str, *, with_comments: bool = True) -> list[list[str]]:
     data = text.encode("latin-1")
     fields, count = split_lines(data)
-    if not comments:
-        fields, count = without_comments(fields, count)
+    if not with_comments:
+        fields, count = without_lines(fields, count, comments(fields, count))
     found = [fields.text(i).decode("latin-1") for i in range(len(fields.starts))]
     stops = np.cumsum(count).tolist()
     assert stops[-1:] in ([], [len(found)])
@@ -30,7 +31,7 @@ def test_lines_are_split_as_one_by_one(lines: list[str], last_end: bool) -> None
     physical = text.removesuffix("\n").split("\n") if text else []
     assert fields_of(text) == [tokens(line) for line in physical]
     kept = [[] if line.startswith("##") else tokens(line) for line in physical]
-    assert fields_of(text, comments=False) == kept
+    assert fields_of(text, with_comments=False) == kept
 
 
 def test_a_line_has_no_line_behind_its_end() -> None:
@@ -49,13 +50,25 @@ def test_names_are_found(listed: list[str], asked: list[str], step: int) -> None
 
 
 def test_names_for_one_slot_are_told_apart() -> None:
-    # More names than slots for as few, of all three kinds of length, and some with the same first eight bytes.
-    listed = [f"{'x' * (size - 4)}{number:04d}" for size in (4, 8, 9, 12, 16, 17) for number in range(3000)]
+    # More names than slots for as few, of all kinds of length, and some with the same first eight bytes.
+    sizes = (4, 8, 9, 12, 16, 17, 64, 65)
+    listed = [f"{'x' * (size - 4)}{number:04d}" for size in sizes for number in range(3000)]
     table = NameTable({name: number for number, name in enumerate(listed)})
     data = "".join(f"{name}\n{name}x\n" for name in listed).encode()
     fields, _ = split_lines(data)
     found = table.find(fields, slice(None)).reshape(-1, 2)
     assert found[:, 0].tolist() == list(range(len(listed)))
+    assert (found[:, 1] == -1).all()
+
+
+def test_long_names_with_one_mixture_are_told_apart() -> None:
+    listed = [f"a_long_name_{number:09d}" for number in range(50)]
+    fields, _ = split_lines("".join(f"{name}\n{name}x\n" for name in listed).encode())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fields_module, "_SPREAD", np.zeros(8, np.uint64))
+        table = NameTable({name: number for number, name in enumerate(listed)})
+        found = table.find(fields, slice(None)).reshape(-1, 2)
+    assert found[:, 0].tolist() == list(range(50))
     assert (found[:, 1] == -1).all()
 
 
@@ -91,21 +104,11 @@ def test_what_is_taken_for_a_short_decimal_is_one(texts: list[str]) -> None:
 def test_fields_near_the_end_can_be_packed() -> None:
     for text in (b"a\n", b"a bc\n", b"abcdefgh\n", b"abcdefghijklmnop\n"):
         fields = Fields(text, np.array([0]), np.array([len(text) - 1]))
-        low, high = fields.packed(np.array([0]))
+        low, high = fields.packed(np.array([0]), 2)
         assert (low.tobytes() + high.tobytes()).rstrip(b"\0") == text[:-1]
 
 
-@pytest.mark.parametrize(
-    ("data", "expected"),
-    [
-        (b"a # b\n#c\nd##\n", False),
-        (b"## a\n", True),
-        (b"a\n##\n", True),
-        (b"a\0b", True),
-        (b"a\v", True),
-        (b"\f", True),
-    ],
-)
-def test_comments_and_odd_bytes_are_unusual(data: bytes, expected: bool) -> None:
-    assert unusual(data) is expected
-    assert with_odd_bytes(data) is (expected and b"#" not in data)
+@pytest.mark.parametrize("data", [b"a\0b", b"a\v", b"\f"])
+def test_odd_bytes_are_found(data: bytes) -> None:
+    assert with_odd_bytes(data)
+    assert not with_odd_bytes(b"a # b\r\n## \t\xff")

@@ -24,8 +24,9 @@ from placerec.srilm.streams import Streams
 def little_memory() -> Iterator[None]:
     """A text is read some words at a time, and hardly any of them are held in memory."""
     with (
-        patch("placerec.srilm.text._BYTES", 16),
-        patch("placerec.srilm.text.BLOCK", 4),
+        patch("placerec.srilm.sentences._BLOCK", 16),
+        patch("placerec.srilm.sentences._BATCH", 4),
+        patch("placerec.srilm.sentences._MANY", 2),
         patch("placerec.lm.stored_text.BLOCK", 8),
         patch("placerec.lm.stored_text.IN_MEMORY", 8),
         patch("placerec.lm.stored_text.WAITING", 4),
