@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask, Singles
-from placerec.errors import LanguageModelError, at
+from placerec.errors import LanguageModelError, at, refuse_string
 from placerec.files import read_text, write_text
 from placerec.lm.arpa_text import first_lines
 from placerec.lm.backoff import BackoffModel
@@ -124,6 +124,7 @@ def with_unigrams(model: BackoffModel, words: Sequence[str]) -> BackoffModel:
 
     KenLM refuses files without <s> and </s> and complains of files without <unk>.
     """
+    refuse_string(words, LanguageModelError)
     old = model.trie.vocabulary
     vocabulary = Vocabulary.of((*old.words, *words))
     new_word = vocabulary.ids(old.words)

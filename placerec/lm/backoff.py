@@ -29,6 +29,9 @@ class BackoffModel:
     log10_probs: tuple[Singles, ...] = field(repr=False)
     backoffs: tuple[Singles, ...] = field(repr=False)
 
+    def __repr__(self) -> str:
+        return f"BackoffModel({self.trie.sizes})"
+
     @property
     def order(self) -> int:
         return self.trie.order
@@ -46,6 +49,7 @@ class BackoffModel:
 
         A word that the model does not list is looked up as `<unk>`; without `<unk>` it has -inf.
         """
+        refuse_string(history, LanguageModelError)
         recent = list(history)[-(self.order - 1) :] if self.order > 1 else []
         return float(self.score([*recent, word])[-1])
 
@@ -54,6 +58,7 @@ class BackoffModel:
 
         The sum over a sequence is its log10 probability.
         """
+        refuse_string(words, LanguageModelError)
         return self.tables.score(self.ids(words))
 
     def perplexity(self, sentences: Iterable[Sequence[str]]) -> "Totals":
@@ -113,11 +118,16 @@ class ModelUnion:
     index: Mapping[str, int] = field(repr=False)
     tables: ScoreTables = field(repr=False)
 
+    def __repr__(self) -> str:
+        models = self.tables.log10_p.shape[1]
+        return f"ModelUnion({models} models, {len(self.index)} words, {len(self.tables.log10_p) - 1} n-grams)"
+
     def score(self, words: Sequence[str]) -> Floats:
         """log10 p float64 (T, C) of each of T words after those before it: empty first context, no markers.
 
         Raises KeyError for a word that is not listed.
         """
+        refuse_string(words, LanguageModelError)
         return self.tables.score(np.fromiter(map(self.index.__getitem__, words), np.int64, len(words)))
 
     def follow(self) -> Callable[[str], list[float]]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask
-from placerec.errors import LanguageModelError, at
+from placerec.errors import LanguageModelError, at, refuse_string
 from placerec.files import all_lines
 from placerec.lm.row_index import RowIndex
 from placerec.lm.stored_text import BLOCK, Block, Numbers, StoredText, changes, distinct_windows
@@ -45,6 +45,9 @@ class NgramCounts:
     counts: tuple[Numbers, ...] = field(repr=False)
     seen: tuple[Mask, ...] = field(repr=False)
 
+    def __repr__(self) -> str:
+        return f"NgramCounts({self.trie.sizes})"
+
     @property
     def order(self) -> int:
         return self.trie.order
@@ -60,6 +63,7 @@ def count_ngrams(
     (sections 3 and 4 of our SRILM specification). The sentences may be more than memory holds; OutputError if they
     are, and a temporary file cannot be written.
     """
+    refuse_string(vocabulary, LanguageModelError)
     numbers: defaultdict[str, int] = defaultdict(lambda: len(numbers))
     for word in (UNKNOWN, SENTENCE_START, SENTENCE_END, *(vocabulary or ())):
         numbers[word]
@@ -78,6 +82,7 @@ def numbered(
 
     With `markers`, sentences that are not empty get `<s>` and `</s>` where they lack them.
     """
+    refuse_string(sentences, LanguageModelError)
     start, end = number(SENTENCE_START), number(SENTENCE_END)
 
     def piece() -> tuple[Ints, Ints]:
@@ -89,6 +94,7 @@ def numbered(
     tokens: list[int] = []
     lengths: list[int] = []
     for sentence in sentences:
+        refuse_string(sentence, LanguageModelError)
         tokens.extend(map(number, sentence))
         lengths.append(len(sentence))
         if len(tokens) >= BLOCK:
@@ -243,6 +249,7 @@ def count_texts(
 
     Beside the pieces that are under way, memory holds a few times the n-grams of one text.
     """
+    refuse_string(vocabulary, LanguageModelError)
     ordered = Vocabulary.of((UNKNOWN, SENTENCE_START, SENTENCE_END, *vocabulary))
     unknown = ordered.index[UNKNOWN]
     narrow = np.min_scalar_type(len(ordered))  # so that little is sent

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
-from placerec.errors import LanguageModelError
+from placerec.errors import LanguageModelError, refuse_string
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import Context, Rule
@@ -31,6 +31,7 @@ def estimate(
     `non_events`: words that are never predicted (but may be context), beside `<s>`; `<unk>` is one unless
     `open_vocabulary`. Raises LanguageModelError if no word is left to predict.
     """
+    refuse_string(non_events, LanguageModelError)
     if any(m < 1 for m in min_count) or not min_count:
         raise LanguageModelError(f"minimum counts {tuple(min_count)} must be 1 or more, one per order")
     vocabulary = counts.trie.vocabulary

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from placerec.errors import LanguageModelError
+from placerec.errors import LanguageModelError, refuse_string
 from placerec.files import read_text
 from placerec.lm.arpa import read_arpa
 from placerec.lm.backoff import BackoffModel
@@ -61,6 +61,7 @@ def _explained(path: Path | str, model: BackoffModel, ngram: str) -> dict[str, A
 
 def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:
     """How the model arrives at p(last word | words before): the contexts it tried, the weights paid, what answered."""
+    refuse_string(words, LanguageModelError)
     if not words:
         raise LanguageModelError("an n-gram to explain holds no word")
     for word in words:

@@ -33,11 +33,19 @@ Fit = Callable[[NgramCounts, int, Mask], tuple[NgramCounts, Discount]]
 
 @dataclass(frozen=True)
 class Smoothing:
-    """How discounts are found, and whether they are used for interpolation or for back-off."""
+    """How discounts are found, and whether they are used for interpolation or for back-off.
+
+    `delta`: that of the lidstone and absolute ones, None for the others.
+    """
 
     name: str
     fit: Fit
     interpolate: bool
+    delta: float | None = None
+
+    def __repr__(self) -> str:
+        delta = "" if self.delta is None else f", delta={self.delta:g}"
+        return f"Smoothing({self.name!r}{delta})"
 
 
 def smoothing(name: str, delta: float | None = None) -> Smoothing:
@@ -54,7 +62,7 @@ def smoothing(name: str, delta: float | None = None) -> Smoothing:
     if not 0 < delta < float("inf") or (base == "absolute" and delta > 1):
         bounds = "above 0 and at most 1" if base == "absolute" else "above 0"
         raise LanguageModelError(f"delta {delta:g} must be a number {bounds}: it is what unseen words live on")
-    return Smoothing(name, _FITS[name](delta), name == base)
+    return Smoothing(name, _FITS[name](delta), name == base, delta if base in ("lidstone", "absolute") else None)
 
 
 def default_delta(name: str) -> float:

@@ -28,6 +28,14 @@ class Trie:
     vocabulary: Vocabulary
     keys: tuple[Ints, ...] = field(repr=False)
 
+    def __repr__(self) -> str:
+        return f"Trie({self.sizes})"
+
+    @property
+    def sizes(self) -> str:
+        """How many n-grams there are of each order, in words."""
+        return f"order {self.order}: " + ", ".join(f"{len(keys)} {n}-grams" for n, keys in enumerate(self.keys, 1))
+
     @property
     def order(self) -> int:
         return len(self.keys)

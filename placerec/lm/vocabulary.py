@@ -24,6 +24,9 @@ class Vocabulary:
         ordered = tuple(sorted(set(words)))
         return Vocabulary(ordered, {word: number for number, word in enumerate(ordered)})
 
+    def __repr__(self) -> str:
+        return f"Vocabulary({len(self)} words)"
+
     def __len__(self) -> int:
         return len(self.words)
 

@@ -17,7 +17,7 @@ texts = st.lists(st.lists(st.sampled_from("abcd"), min_size=1, max_size=8), min_
 
 
 def trained(sentences: list[list[str]], order: int = 3) -> BackoffModel:
-    return estimate(count_ngrams(sentences, order, vocabulary="abcd"), smoothing("witten-bell"))
+    return estimate(count_ngrams(sentences, order, vocabulary=[*"abcd"]), smoothing("witten-bell"))
 
 
 def interpolated(models: Sequence[BackoffModel], weights: Sequence[float]) -> BackoffModel:

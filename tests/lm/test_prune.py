@@ -19,7 +19,7 @@ thresholds = st.sampled_from([1e-8, 1e-4, 1e-2, 0.1])
 
 
 def trained(sentences: list[list[str]], order: int = 3) -> BackoffModel:
-    return estimate(count_ngrams(sentences, order, vocabulary="abcd"), smoothing("witten-bell"))
+    return estimate(count_ngrams(sentences, order, vocabulary=[*"abcd"]), smoothing("witten-bell"))
 
 
 def sizes(model: BackoffModel) -> list[int]:
