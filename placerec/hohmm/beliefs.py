@@ -1,4 +1,4 @@
-"""Beliefs as text: one tab-separated line per frame, the same for a file and for a stream.
+"""Beliefs, and their text: one tab-separated line per frame, in a file and in a stream.
 
     frame  time  place  word  selected  best  PLACE...  [unknown]
 

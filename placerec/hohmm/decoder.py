@@ -136,7 +136,7 @@ class SequenceDecoder:
         return copied
 
     def _restart(self, per: str = "frame") -> None:
-        """Begin with the settings as they are; `per`: what a step between two selected words is, as of `Transition`."""
+        """Begin with the settings as they are; `per`: a step between selected words: `update`, `frame` or `second`."""
         self._per = per
         self._needs_times = self.max_gap is not None or per == "second"
         self._zero_likelihood_words = 0
@@ -187,6 +187,15 @@ class SequenceDecoder:
         probability, unknown, _ = now.posterior
         return Belief(self.places, probability.copy(), word, selected, unknown)
 
+    def answer(self, word: str, time: float | None = None, distance: float | None = None) -> Belief:
+        """The belief after one more frame and its word, which holds the belief if it is not in the vocabulary.
+
+        `time`, `distance`, and what is raised for a time: see `update`.
+        """
+        if word in self._words:
+            return self.update(word, time, distance)
+        return self.skip(time)._replace(word=word)
+
     def skip(self, time: float | None = None) -> Belief:
         """The belief after one more frame that has no word: it is held, but the frame and its time count."""
         self._pass(time, needed=False)
@@ -198,10 +207,10 @@ class SequenceDecoder:
         return Belief(self.places, probability.copy(), word, selected, unknown)
 
     def decode(self, stream: WordStream) -> Beliefs:
-        """The beliefs over a whole sequence: those that `update` gives from a reset, which later words never change.
+        """The beliefs over a whole sequence: those that `answer` gives from a reset, which later words never change.
 
-        Words that are not in the vocabulary are skipped as `skip` does, and counted in a warning. Raises StreamError,
-        naming the frame, if its time is needed and missing, or goes back.
+        Words that are not in the vocabulary are counted in a warning. Raises StreamError, naming the frame, if a time
+        is needed and missing, or goes back.
         """
         self.reset()
         warn_of_unlisted(stream, self)
@@ -209,7 +218,7 @@ class SequenceDecoder:
         frames = zip(stream.words, stream.times.tolist(), stream.distances.tolist(), strict=True)
         for name, (word, time, distance) in zip(stream.frames, frames, strict=True):
             try:
-                rows.append(self.update(word, time, distance) if word in self else self.skip(time))
+                rows.append(self.answer(word, time, distance))
             except ModelError as error:
                 raise StreamError(f"{stream.name}: frame {name!r}: {error}") from error
         return Beliefs.of(

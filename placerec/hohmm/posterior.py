@@ -20,7 +20,10 @@ from placerec.lm.logs import LN10
 
 
 def forward_backward(log10_likelihoods: Floats, transition: Transition, elapsed: Floats) -> Floats:
-    """P(place at t | all T words) float64 (T, C): the forward-backward algorithm; arguments as of `filter_stream`."""
+    """P(place at t | all T words) float64 (T, C): the forward-backward algorithm.
+
+    `log10_likelihoods` float64 (T, C): of each word in each place. `elapsed` float64 (T,): steps since the word before.
+    """
     T = len(log10_likelihoods)
     if not T:
         return np.empty(log10_likelihoods.shape)

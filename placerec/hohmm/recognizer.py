@@ -165,8 +165,9 @@ class Recognizer(SequenceDecoder):
     ) -> Beliefs:
         """The beliefs over a whole sequence: those that `update` gives from a reset, which later words never change.
 
-        `smooth`, `lag`: see `posterior`; later words count. `viterbi`: `best` is the most probable path. Words that the
-        models do not list are skipped as `skip` does, and counted in a warning. Raises StreamError as `evidence_in`.
+        Unless `smooth` (all words count) or `lag` (the words up to so many frames later count) is asked for. `viterbi`:
+        `best` is the most probable path. Words that the models do not list are counted in a warning. Raises
+        StreamError, naming the frame, if a time is needed and missing, or goes back.
         """
         warn_of_unlisted(stream, self)
         parts = list(self.evidence(stream))

@@ -116,15 +116,15 @@ def decode_lines(decoder: SequenceDecoder, lines: Iterable[str], *, as_json: boo
     strange = 0
     for frame, line in enumerate(lines):
         word, time, distance = _fields(line, frame)
-        known = word in decoder
-        if not known and not strange:
-            log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
-        strange += not known
+        if word not in decoder:
+            if not strange:
+                log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
+            strange += 1
         try:
-            belief = decoder.update(word, time, distance) if known else decoder.skip(time)
+            belief = decoder.answer(word, time, distance)
         except ModelError as error:
             raise StreamError(at("<stdin>", frame + 1, str(error))) from error
-        yield format_belief(str(frame), time, "", belief._replace(word=word), as_json=as_json)
+        yield format_belief(str(frame), time, "", belief, as_json=as_json)
     if strange:
         log.warning("<stdin>: lines skipped because the models do not list their word: %d", strange)
     if never := decoder.zero_likelihood_words:

@@ -153,9 +153,7 @@ def _believed(live: LiveFrame, dictionary: "Dictionary", decoder: SequenceDecode
         decoder.skip()
         return None
     try:
-        if word in decoder:
-            return decoder.update(word, frame.time, distance)
-        return decoder.skip(frame.time)._replace(word=word)
+        return decoder.answer(word, frame.time, distance)
     except ModelError as error:
         raise StreamError(f"{tally.name}: frame {frame.name!r}: {error}") from error
 

@@ -45,7 +45,7 @@ def fit(units: Sequence[Ints], truth: Ints, sequences: Ints, words: Sequence[int
 
 
 def cascade(units: Sequence[Ints], truth: Ints, words: Sequence[int], places: int, margin: float) -> CueStep:
-    """The same with a given threshold."""
+    """The cascade of two cues with a given threshold: the least lead with which the first cue decides alone."""
     first, second = (_log_p(its, truth, K, places) for its, K in zip(units, words, strict=True))
 
     def step(unit: int, look_again: Callable[[], int]) -> Answer:

@@ -33,7 +33,7 @@ class PairEmissions:
         return self.score_ids(ids, before(ids, self.longest))
 
     def follow(self) -> Callable[[str], Sequence[float]]:
-        """The same for one word after the other, in constant memory."""
+        """A function from each word of a sequence in turn to its log10 p (C) in each place, in constant memory."""
         recent = deque([-1] * self.longest, maxlen=self.longest)
 
         def score(word: str) -> list[float]:

@@ -40,7 +40,7 @@ def fit(training: DescriptorTrainingSet, *, seed: int = 0) -> MakePointStepper:
 
 
 def fit_filtered(training: DescriptorTrainingSet, *, seed: int = 0) -> MakePointStepper:
-    """The same scores through the filter."""
+    """Beliefs of the machines' scores, as likelihoods, through the filter; MissingExtraError without scikit-learn."""
     scores = _scores(training, seed)
     shares = np.bincount(training.truth, minlength=len(training.places)) / len(training.truth)
     prior = np.log(shares)

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decoding = PAPER) -> Calibration:
     """`placerec calibrate`: fit a temperature to the beliefs in labelled `tokens`, and keep it in model.json.
 
-    `options`: as for `decode`; the calibration holds for decoding with the same. Frames without a label, and those of
+    `options`: the calibration holds for decoding with these. Frames without a label, and those of
     places that the model does not know, are left out and counted. Raises ModelError for sequences that trained the
     model, and if no frame is left; model.json is then as it was.
     """

@@ -48,7 +48,7 @@ def read_corpus(
     vocabulary: Path | str | None = None,
     remedy: str = REMEDY,
 ) -> Corpus:
-    """What to train on, in memory; as `gather_corpus` reads it."""
+    """Token streams or a folder of sentences, read into memory; arguments and errors are those of `gather_corpus`."""
     sentences: dict[str, Sentences] = {}
 
     def keep(place: str, text: Sentences) -> None:

@@ -121,9 +121,9 @@ def transition_of(model: PlaceModels, options: Decoding) -> Transition:
 
 
 def describe_decoding(model: PlaceModels, options: Decoding) -> dict[str, Any]:
-    """What the beliefs of `model` depend on, in plain values: the same for all ways to ask for the same.
+    """What the beliefs of `model` depend on, in plain values that do not tell in which words it was asked for.
 
-    A file of transitions stands there as its matrix, rows in the order of the places.
+    A file of transitions stands there as a matrix, rows in the order of the places.
     """
     fixed = options.transition == "fixed"
     transition = transition_of(model, options)

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from placerec.arrays import Ints
 from placerec.errors import ModelError, PlacerecError
 from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
@@ -25,7 +24,7 @@ from placerec.hohmm import Calibration
 from placerec.hohmm.unknown import Histogram
 from placerec.lm import BackoffModel, read_arpa
 from placerec.model.options import ModelOptions
-from placerec.model.record import LearnedSequence, Record
+from placerec.model.record import LearnedSequence, Record, Route
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, parse_selection, read_sentences, read_vocabulary
 from placerec.words.folder import VOCABULARY
@@ -315,14 +314,15 @@ def _format(value: Any, indent: str) -> str:
 
 
 def _describe_record(record: Record) -> dict[str, Any]:
-    transitions, distances = None, record.distances
-    if record.transitions is not None and record.triples is not None:
-        triples = [[*route, int(record.triples[tuple(route)])] for route in np.argwhere(record.triples).tolist()]
-        transitions = {"counts": record.transitions.tolist(), "triples": triples}
+    transitions, triples, distances = record.transitions, record.triples, record.distances
+    steps = None
+    if transitions is not None and triples is not None:
+        listed = [[*route, int(triples[tuple(route)])] for route in np.argwhere(triples).tolist()]
+        steps = {"counts": transitions.tolist(), "triples": listed}
     return {
         "sequences": [{"name": s.name, "visits": dict(s.visits)} for s in record.sequences],
         "dictionary": record.dictionary,
-        "transitions": transitions,
+        "transitions": steps,
         "distances": distances
         and {place: {str(b): count for b, count in histogram.items()} for place, histogram in distances.items()},
     }
@@ -333,26 +333,24 @@ def _read_record(values: Mapping[str, Any]) -> Record:
         LearnedSequence(str(item["name"]), {place: _count(n) for place, n in item["visits"].items()})
         for item in values["sequences"]
     )
-    places, steps = values["places"], values["transitions"]
-    distances = _read_distances(values)
+    places, steps, distances = values["places"], values["transitions"], _read_distances(values)
     if Record(learned).places != places or (steps is None) != (distances is None):
         raise ValueError(places)
-    transitions = steps and np.array([[*map(_count, row)] for row in steps["counts"]], np.int64)
-    triples = steps and _read_triples(steps["triples"], len(places))
-    record = Record(learned, values["dictionary"], transitions, distances, triples)
-    if transitions is not None and transitions.shape != (len(places), len(places)):
-        raise ValueError(transitions.shape)
-    return record
+    routes = None if steps is None else _read_routes(steps, places)
+    return Record(learned, values["dictionary"], routes, distances)
 
 
-def _read_triples(listed: Any, C: int) -> Ints:
-    triples = np.zeros((C, C, C), np.int64)
-    for entry in listed:
+def _read_routes(steps: Mapping[str, Any], places: Sequence[str]) -> dict[Route, int]:
+    counts = np.array([[*map(_count, row)] for row in steps["counts"]], np.int64)
+    if counts.shape != (len(places), len(places)):
+        raise ValueError(counts.shape)
+    routes: dict[Route, int] = {(places[i], places[j]): int(counts[i, j]) for i, j in np.argwhere(counts).tolist()}
+    for entry in steps["triples"]:
         i, j, k, count = map(_count, entry)
-        if max(i, j, k) >= C or j in (i, k):
+        if max(i, j, k) >= len(places) or j in (i, k):
             raise ValueError(entry)
-        triples[i, j, k] = count
-    return triples
+        routes[places[i], places[j], places[k]] = count
+    return routes
 
 
 def _read_distances(values: Mapping[str, Any]) -> dict[str, Histogram] | None:

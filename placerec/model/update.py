@@ -123,8 +123,8 @@ def _knows(old: _Model, new: Corpus) -> bool:
     for place in new.record.places:
         text = read_text(old.folder.place(place).sentences, ModelError)
         blocks = _blocks(old.record, place, text.splitlines(keepends=True))
-        its = _blocks(new.record, place, _lines(new, place))
-        if any(blocks[name] != block for name, block in its.items()):
+        given = _blocks(new.record, place, _lines(new, place))
+        if any(blocks[name] != block for name, block in given.items()):
             return False
     return True
 

@@ -87,7 +87,7 @@ def test_a_model_without_delta_does_not_name_one(tmp_path: Path) -> None:
 def test_model_json_tells_all_options(tmp_path: Path) -> None:
     options = ModelOptions(3, "lidstone-backoff", 0.5, (1, 2), False, Selection("unique"))
     sequences = (LearnedSequence("run2", {"kitchen": 2}), LearnedSequence("run1", {"kitchen": 0}))
-    record = Record(sequences, "f00", np.array([[7]]), {"kitchen": {-3: 8, 2: 1}}, np.zeros((1, 1, 1), np.int64))
+    record = Record(sequences, "f00", {("kitchen", "kitchen"): 7}, {"kitchen": {-3: 8, 2: 1}})
     train_model(KITCHEN, ("a", "b"), tmp_path, options=options, record=record)
     assert json.loads((tmp_path / "model.json").read_text()) == {
         "format": "placerec model 1",
