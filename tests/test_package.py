@@ -102,6 +102,14 @@ def test_words_are_decoded_without_images_libraries() -> None:
     assert loaded_by("import placerec; placerec.load_recognizer, placerec.read_stream") == {"numpy"}
 
 
+def test_the_parts_of_srilm_import_from_the_parts_below_alone() -> None:
+    parts = ("text", "order", "model", "tools")
+    for i, part in enumerate(parts):
+        for path in (PACKAGE / "srilm" / part).rglob("*.py"):
+            above = tuple(f"placerec.srilm.{other}" for other in parts[i + 1 :])
+            assert [name for _, name in imports(path) if name.startswith(above)] == []
+
+
 def test_every_public_name_resolves() -> None:
     assert placerec.__all__ == sorted(placerec.__all__)
     for name in placerec.__all__:
@@ -134,8 +142,8 @@ def test_rooms_know_only_rooms_to_their_left(path: Path) -> None:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_the_library_neither_prints_nor_exits(path: Path) -> None:
-    # srilm/run.py is where the process begins and ends for the tools in bin/.
-    if room_of(path) == "cli" or path == PACKAGE / "srilm/run.py":
+    # srilm/tools/run.py is where the process begins and ends for the tools in bin/.
+    if room_of(path) == "cli" or path == PACKAGE / "srilm/tools/run.py":
         return
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from placerec.srilm.run import TOOLS, run
+from placerec.srilm.tools.run import TOOLS, run
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem

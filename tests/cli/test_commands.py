@@ -13,7 +13,7 @@ from helpers.typed_commands import SMALL, done, fails, make_words, misused, plac
 from placerec.cli import commands
 from placerec.cli.train_lm import SMOOTHING_NAMES
 from placerec.lm import SMOOTHINGS
-from placerec.srilm.run import TOOLS
+from placerec.srilm.tools.run import TOOLS
 from placerec.words import write_stream
 
 NAMES = sorted(set(commands.commands) - set(TOOLS))

@@ -31,10 +31,11 @@ from placerec.errors import PlacerecError
 from placerec.lm import estimation
 from placerec.lm.arpa import format_arpa, read_arpa, write_arpa
 from placerec.lm.inspect import inspect_model
-from placerec.srilm import arpa_reader, sentences
-from placerec.srilm.ngram import ngram
-from placerec.srilm.ngram_count import ngram_count
-from placerec.srilm.streams import Streams
+from placerec.srilm.model import arpa_reader
+from placerec.srilm.text import sentences
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.ngram import ngram
+from placerec.srilm.tools.ngram_count import ngram_count
 
 LONGEST_RUN = 20.0
 _SMALL = 5000

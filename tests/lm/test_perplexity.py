@@ -11,8 +11,8 @@ import pytest
 from placerec.errors import LanguageModelError
 from placerec.lm import count_ngrams, estimate, smoothing, with_unigrams, write_arpa
 from placerec.lm.perplexity import Totals, rank, rank_word, tally_sentences
-from placerec.srilm.ngram import ngram
-from placerec.srilm.streams import Streams
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.ngram import ngram
 
 ZERO = -np.inf
 

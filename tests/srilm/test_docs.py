@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from placerec.srilm.options import Options
+from placerec.srilm.tools.options import Options
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/srilm.md"
 TABLED = ("ngram-count", "ngram", "ngram-merge")
 
 
 def options_of(tool: str) -> Options:
-    options: Options = pytest.importorskip(f"placerec.srilm.{tool.replace('-', '_')}").OPTIONS
+    options: Options = pytest.importorskip(f"placerec.srilm.tools.{tool.replace('-', '_')}").OPTIONS
     assert len(options) >= 2
     return options
 
@@ -64,7 +64,7 @@ def _rewrite() -> None:
     page = PAGE.read_text()
     for tool in TABLED:
         old = table(page, tool)
-        lines = rows(import_module(f"placerec.srilm.{tool.replace('-', '_')}").OPTIONS)
+        lines = rows(import_module(f"placerec.srilm.tools.{tool.replace('-', '_')}").OPTIONS)
         head = "| option | | what it does, or why it is refused |\n|---|---|---|\n"
         body = "".join(f"{line}\n" for line in old)
         page = page.replace(f"### {tool}\n\n{head}{body}", f"### {tool}\n\n{head}" + "".join(f"{x}\n" for x in lines))

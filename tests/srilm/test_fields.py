@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from placerec.srilm import arpa_block
-from placerec.srilm import fields as fields_module
-from placerec.srilm.fields import Fields, NameTable, comments, split_lines, with_odd_bytes, without_lines
-from placerec.srilm.streams import tokens
+from placerec.srilm.model import arpa_lines
+from placerec.srilm.text import fields as fields_module
+from placerec.srilm.text.fields import Fields, NameTable, comments, split_lines, with_odd_bytes, without_lines
+from placerec.srilm.text.streams import tokens
 
 lines = st.lists(st.text("ab#\t \r\x01\xe9", max_size=8), max_size=6)
 names = st.text("abc", min_size=1, max_size=20) | st.sampled_from(["a" * size for size in (8, 16, 63, 64, 65, 80)])
@@ -79,13 +79,13 @@ decimals = st.one_of(
 )
 
 
-@given(st.lists(decimals, min_size=1), st.sampled_from([0, arpa_block._FEW]))
+@given(st.lists(decimals, min_size=1), st.sampled_from([0, arpa_lines._FEW]))
 def test_decimal_numbers_are_rounded_as_python_rounds_them(texts: list[str], few: int) -> None:
     data = "".join(f"{text}\n" for text in texts).encode()
     fields, _ = split_lines(data)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(arpa_block, "_FEW", few)
-        values = arpa_block._numbers(fields, np.arange(len(texts)), most=0.0)
+        patch.setattr(arpa_lines, "_FEW", few)
+        values = arpa_lines._numbers(fields, np.arange(len(texts)), most=0.0)
     assert values is not None
     expected = np.array([float(text) for text in texts]).astype(np.float32)
     np.testing.assert_array_equal(values, np.where(expected == -99, -np.inf, expected))
@@ -95,7 +95,7 @@ def test_decimal_numbers_are_rounded_as_python_rounds_them(texts: list[str], few
 def test_what_is_taken_for_a_short_decimal_is_one(texts: list[str]) -> None:
     data = "".join(f"{text}\n" for text in texts).encode()
     fields, _ = split_lines(data)
-    for decode in (arpa_block._short_decimals, arpa_block._decimals):
+    for decode in (arpa_lines._short_decimals, arpa_lines._decimals):
         values, plain = decode(fields, np.arange(len(texts)))
         for text, value, is_plain in zip(texts, values.tolist(), plain.tolist(), strict=True):
             assert not is_plain or (value == float(text) and set(text) <= set("0123456789.-"))

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from placerec.srilm.ngram import ngram
-from placerec.srilm.ngram_count import ngram_count
-from placerec.srilm.ngram_merge import ngram_merge
-from placerec.srilm.streams import Streams
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.ngram import ngram
+from placerec.srilm.tools.ngram_count import ngram_count
+from placerec.srilm.tools.ngram_merge import ngram_merge
 
 BIN = Path(__file__).resolve().parents[2] / "bin"
 TOOLS: dict[str, Callable[[Sequence[str], Streams], int]] = {

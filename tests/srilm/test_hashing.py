@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from placerec.lm.counts import count_text
 from placerec.lm.stored_text import StoredText
-from placerec.srilm.hashing import capacities, first_positions, needed, slot_order, walk_order
-from placerec.srilm.streams import tokens
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.order.hashing import capacities, first_positions, needed, slot_order, walk_order
+from placerec.srilm.text.streams import tokens
+from placerec.srilm.text.vocabulary import WordList
 
 UNSORTED = ("nc-out-unsorted", "nc-out-unsorted2", "nc-out-unsorted3")
 

@@ -16,17 +16,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.errors import OutputError
-from placerec.srilm.ngram_count import ngram_count
-from placerec.srilm.streams import Streams
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.ngram_count import ngram_count
 
 
 @contextmanager
 def little_memory() -> Iterator[None]:
     """A text is read some words at a time, and hardly any of them are held in memory."""
     with (
-        patch("placerec.srilm.sentences._BLOCK", 16),
-        patch("placerec.srilm.sentences._BATCH", 4),
-        patch("placerec.srilm.sentences._MANY", 2),
+        patch("placerec.srilm.text.sentences._BLOCK", 16),
+        patch("placerec.srilm.text.sentences._BATCH", 4),
+        patch("placerec.srilm.text.sentences._MANY", 2),
         patch("placerec.lm.stored_text.BLOCK", 8),
         patch("placerec.lm.stored_text.IN_MEMORY", 8),
         patch("placerec.lm.stored_text.WAITING", 4),
@@ -126,7 +126,7 @@ def test_a_full_disk_is_an_error_of_one_line() -> None:
 CHILD = """
 import re, sys
 from placerec.lm import stored_text, windows
-from placerec.srilm.run import run
+from placerec.srilm.tools.run import run
 stored_text.IN_MEMORY, windows.WAITING = 1 << 19, 1 << 16
 status = run("ngram-count", sys.argv[1:])
 print(re.search(r"VmHWM:\\s*(\\d+) kB", open("/proc/self/status").read())[1])

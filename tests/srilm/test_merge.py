@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from placerec.srilm.ngram_merge import ngram_merge
-from placerec.srilm.streams import Streams
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.ngram_merge import ngram_merge
 
 
 def merge(*arguments: str, stdin: bytes = b"") -> tuple[int, str, str]:

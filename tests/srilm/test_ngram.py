@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from placerec.srilm import sentences
-from placerec.srilm.ngram import ngram
-from placerec.srilm.streams import Streams
+from placerec.srilm.text import sentences
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.ngram import ngram
 
 # log10 of 1/2, 1/4 and 1/8: sums of them are easily checked.
 H, Q, E = "-0.30103", "-0.60206", "-0.90309"

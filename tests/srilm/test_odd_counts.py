@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from placerec.srilm.ngram_count import ngram_count
-from placerec.srilm.streams import Streams
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.ngram_count import ngram_count
 
 
 def run(counts: str, *arguments: str) -> tuple[int, str, str]:

@@ -9,8 +9,8 @@ import pytest
 
 from placerec.lm import SMOOTHINGS
 from placerec.model import ModelOptions, train_model
-from placerec.srilm.ngram_count import ngram_count
-from placerec.srilm.streams import Streams
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.ngram_count import ngram_count
 
 
 def visits() -> list[list[str]]:

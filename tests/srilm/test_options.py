@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from placerec.srilm.options import Option, Parsed, leading_float, leading_int, parse
-from placerec.srilm.streams import SrilmError, Streams
+from placerec.srilm.text.numbers import leading_float, leading_int
+from placerec.srilm.text.streams import SrilmError, Streams
+from placerec.srilm.tools.options import Option, Parsed, parse
 from placerec.version import __version__
 
 OPTIONS = {

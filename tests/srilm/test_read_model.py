@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from placerec.lm.arpa import row_blocks
 from placerec.lm.mutable import MutableModel
-from placerec.srilm import arpa_reader
-from placerec.srilm.arpa import read_model
-from placerec.srilm.arpa_reader import log_value
-from placerec.srilm.context_order import ContextTimes, message_order
-from placerec.srilm.ngram import ngram
-from placerec.srilm.streams import SrilmError, Streams
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.model import arpa_reader
+from placerec.srilm.model.arpa import read_model
+from placerec.srilm.model.arpa_reader import log_value
+from placerec.srilm.order.contexts import ContextTimes, message_order
+from placerec.srilm.text.streams import SrilmError, Streams
+from placerec.srilm.text.vocabulary import WordList
+from placerec.srilm.tools.ngram import ngram
 
 HEADER = "\\data\\\nngram 1=2\nngram 2=1\n"
 GOOD = HEADER + "\\1-grams:\n-1\ta\t-0.5\n-2\tb\n\\2-grams:\n-0.1\ta b\n\\end\\\n"

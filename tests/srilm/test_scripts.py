@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from placerec.srilm.add_ppls import add_ppls
-from placerec.srilm.change_lm_vocab import change_lm_vocab, restricted
-from placerec.srilm.compute_best_mix import best_mix, compute_best_mix, starting_weights
-from placerec.srilm.run import TOOLS
-from placerec.srilm.streams import SrilmError, Streams
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.text.streams import SrilmError, Streams
+from placerec.srilm.text.vocabulary import WordList
+from placerec.srilm.tools.add_ppls import add_ppls
+from placerec.srilm.tools.change_lm_vocab import change_lm_vocab, restricted
+from placerec.srilm.tools.compute_best_mix import best_mix, compute_best_mix, starting_weights
+from placerec.srilm.tools.run import TOOLS
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = ROOT / "bin"
@@ -286,7 +286,7 @@ def test_placerec_hands_arguments_through() -> None:
 
 def test_tools_load_numpy_and_our_rooms_only() -> None:
     script = (
-        f"import sys; sys.path.insert(0, {str(ROOT)!r}); from placerec.srilm.run import run; "
+        f"import sys; sys.path.insert(0, {str(ROOT)!r}); from placerec.srilm.tools.run import run; "
         "run('ngram-count', ['-version']); "
         "print(sorted({'click', 'cv2', 'scipy', 'kenlm', 'placerec.vision', 'placerec.cli'} & set(sys.modules)))"
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from placerec.srilm.streams import Lines, SrilmError, Streams, exit_status, tokens
+from placerec.srilm.text.streams import Lines, SrilmError, Streams, exit_status, tokens
 
 
 def streams(data: bytes = b"") -> tuple[Streams, io.BytesIO, io.BytesIO]:

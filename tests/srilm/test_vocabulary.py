@@ -3,8 +3,8 @@
 import io
 from pathlib import Path
 
-from placerec.srilm.streams import Streams
-from placerec.srilm.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.text.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
 
 
 def streams() -> tuple[Streams, io.BytesIO]:

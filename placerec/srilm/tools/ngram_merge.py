@@ -4,9 +4,9 @@ import heapq
 from collections.abc import Iterator, Sequence
 from itertools import islice
 
-from placerec.srilm.counts_file import count_lines
-from placerec.srilm.options import Option, parse
-from placerec.srilm.streams import SrilmError, Streams, exit_status
+from placerec.srilm.text.counts_file import count_lines
+from placerec.srilm.text.streams import SrilmError, Streams, exit_status
+from placerec.srilm.tools.options import Option, parse
 
 TOOL = "ngram-merge"
 OPTIONS = {

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from placerec.lm.counts import NgramCounts, tabulate
-from placerec.srilm.options import bounded_int, leading_float
-from placerec.srilm.streams import Streams, tokens
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.text.numbers import bounded_int, leading_float
+from placerec.srilm.text.streams import Streams, tokens
+from placerec.srilm.text.vocabulary import WordList
 
 MOST_TOKENS = 100
 MALFORMED = "malformed N-gram count or more than 100 words per line"

@@ -8,11 +8,11 @@ from placerec.arrays import Ints
 from placerec.lm.mutable import MutableModel
 from placerec.lm.score import ScoreTables
 from placerec.lm.trie import closed_trie
-from placerec.srilm.arpa_block import Block
-from placerec.srilm.arpa_reader import Reader
-from placerec.srilm.context_order import NEVER, ContextTimes
-from placerec.srilm.streams import Streams
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.model.arpa_lines import Block
+from placerec.srilm.model.arpa_reader import Reader
+from placerec.srilm.order.contexts import NEVER, ContextTimes
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.text.vocabulary import WordList
 
 
 def read_model(

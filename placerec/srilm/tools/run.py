@@ -36,12 +36,14 @@ def _run(tool: str, arguments: Sequence[str], shown: str) -> int:
     from importlib import import_module
 
     from placerec.errors import PlacerecError
-    from placerec.srilm.streams import Streams
+    from placerec.srilm.text.streams import Streams
 
     name = tool.replace("-", "_")
     streams = Streams(sys.stdin.buffer, sys.stdout.buffer, sys.stderr.buffer)
     try:
-        status = getattr(import_module(f"placerec.srilm.{name}"), name)(_latin(arguments), streams, _latin([shown])[0])
+        status = getattr(import_module(f"placerec.srilm.tools.{name}"), name)(
+            _latin(arguments), streams, _latin([shown])[0]
+        )
         streams.stdout.flush()
     except PlacerecError as error:
         streams.say(f"{shown}: {error}")

@@ -10,8 +10,8 @@ import numpy as np
 
 from placerec.arrays import Ints
 from placerec.lm.trie import Trie
-from placerec.srilm.hashing import table_order
-from placerec.srilm.messages import ContextOrder
+from placerec.srilm.order.hashing import table_order
+from placerec.srilm.order.messages import ContextOrder
 
 NEVER = np.iinfo(np.int64).max
 

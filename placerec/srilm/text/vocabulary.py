@@ -4,7 +4,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
-from placerec.srilm.streams import Streams, tokens
+from placerec.srilm.text.streams import Streams, tokens
 
 if TYPE_CHECKING:
     from placerec.lm.vocabulary import Vocabulary

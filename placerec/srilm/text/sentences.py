@@ -14,10 +14,10 @@ from placerec.ahead import make_ahead
 from placerec.arrays import Ints, Mask
 from placerec.lm.stored_text import Numbers
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, add_markers, find_markers
-from placerec.srilm.fields import Fields, NameTable, comments, split_lines, usual_blocks, without_lines
-from placerec.srilm.options import leading_float
-from placerec.srilm.streams import Lines, tokens
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.text.fields import Fields, NameTable, comments, split_lines, usual_blocks, without_lines
+from placerec.srilm.text.numbers import leading_float
+from placerec.srilm.text.streams import Lines, tokens
+from placerec.srilm.text.vocabulary import WordList
 
 LONGEST = 50000
 # Bytes read at once where lines are as programs write them, and words where they are not.

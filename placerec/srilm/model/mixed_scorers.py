@@ -9,8 +9,8 @@ from placerec.arrays import Ints, Singles
 from placerec.lm.logs import p_of
 from placerec.lm.mix import Cache, loglinear, mixed, posteriors, with_cache
 from placerec.lm.score import TokenSequence
-from placerec.srilm.scorers import Model, ModelView, Scored, Scorer, View, event_numbers
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.model.scorers import Model, ModelView, Scored, Scorer, View, event_numbers
+from placerec.srilm.text.vocabulary import WordList
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from placerec.lm.logs import p_of
 from placerec.lm.perplexity import Ranks, Totals
 from placerec.lm.score import TokenSequence
 from placerec.lm.vocabulary import SENTENCE_END
-from placerec.srilm.counts_file import MALFORMED, MOST_TOKENS, parse_count
-from placerec.srilm.report import RANKS, TOKENS, Printer, block
-from placerec.srilm.scorers import ModelView, Scorer
-from placerec.srilm.streams import tokens
+from placerec.srilm.model.scorers import ModelView, Scorer
+from placerec.srilm.text.counts_file import MALFORMED, MOST_TOKENS, parse_count
+from placerec.srilm.text.streams import tokens
+from placerec.srilm.tools.reports import RANKS, TOKENS, Printer, block
 
 Table = dict[tuple[int, ...], float]
 

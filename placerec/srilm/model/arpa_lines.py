@@ -12,7 +12,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LOG_ZERO
-from placerec.srilm.fields import Fields, Packed, split_lines, with_odd_bytes
+from placerec.srilm.text.fields import Fields, Packed, split_lines, with_odd_bytes
 
 # So many numbers are sooner converted one by one.
 _FEW = 200

@@ -8,17 +8,17 @@ import numpy as np
 from placerec.arrays import Singles
 from placerec.lm.score import TokenSequence
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
-from placerec.srilm.arpa_lookup import read_tables
-from placerec.srilm.ngram_options import OPTIONS
-from placerec.srilm.options import Parsed, parse
-from placerec.srilm.report import TOKENS, Printer, print_perplexity
-from placerec.srilm.scorers import Model, Scorer, event_mask
-from placerec.srilm.sentences import Handling
-from placerec.srilm.streams import SrilmError, Streams, exit_status, tokens
-from placerec.srilm.vocabulary import PAUSE, WordList, format_words, read_aliases, read_words
+from placerec.srilm.model.arpa_lookup import read_tables
+from placerec.srilm.model.scorers import Model, Scorer, event_mask
+from placerec.srilm.text.sentences import Handling
+from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
+from placerec.srilm.text.vocabulary import PAUSE, WordList, format_words, read_aliases, read_words
+from placerec.srilm.tools.ngram_options import OPTIONS
+from placerec.srilm.tools.options import Parsed, parse
+from placerec.srilm.tools.reports import TOKENS, Printer, print_perplexity
 
 if TYPE_CHECKING:
-    from placerec.srilm.ngram_models import Models
+    from placerec.srilm.tools.ngram_models import Models
 
 TOOL = "ngram"
 # With these options alone the model is only asked for probabilities. What other options need is loaded where they are
@@ -74,7 +74,7 @@ class _Run:
 
     def models(self) -> "Models":
         """The models that are mixed, changed or written."""
-        from placerec.srilm.ngram_models import Models
+        from placerec.srilm.tools.ngram_models import Models
 
         return Models(self.options, self.words, self.streams)
 
@@ -126,7 +126,7 @@ class _Run:
 
     def print_counts(self, scorer: Scorer, printer: Printer) -> None:
         """`-counts`."""
-        from placerec.srilm.count_report import Counting, print_counts
+        from placerec.srilm.tools.count_report import Counting, print_counts
 
         options = self.options
         order = options["count-order"] or self.order

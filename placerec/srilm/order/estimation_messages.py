@@ -8,9 +8,9 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.counts import NgramCounts
 from placerec.lm.trie import build_trie, runs
-from placerec.srilm.first_seen import FirstSeen
-from placerec.srilm.hashing import walk_order
-from placerec.srilm.messages import Messages
+from placerec.srilm.order.first_seen import FirstSeen
+from placerec.srilm.order.hashing import walk_order
+from placerec.srilm.order.messages import Messages
 
 _NEVER = np.iinfo(np.int64).max
 _LONG = 1 << 40

@@ -9,8 +9,8 @@ import numpy as np
 
 from placerec.arrays import Floats
 from placerec.lm.logs import LEAST_LOG10, LN10
-from placerec.srilm.options import leading_float
-from placerec.srilm.streams import SrilmError, Streams, exit_status
+from placerec.srilm.text.numbers import leading_float
+from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 
 TOOL = "compute-best-mix"
 USAGE = 'usage: {tool} [lambda="L1 L2 ..."] [precision=P] PPL1 PPL2 ...  (outputs of ngram -debug 2 -ppl)'

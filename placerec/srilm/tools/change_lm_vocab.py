@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from io import BytesIO
 
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
-from placerec.srilm.streams import SrilmError, Streams, exit_status, tokens
-from placerec.srilm.vocabulary import WordList, read_words
+from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
+from placerec.srilm.text.vocabulary import WordList, read_words
 
 TOOL = "change-lm-vocab"
 USAGE = "usage: {tool} -vocab FILE [-lm FILE] [-write-lm FILE] [-subset] [-tolower] [options of ngram]"
@@ -22,7 +22,7 @@ def change_lm_vocab(arguments: Sequence[str], streams: Streams, tool: str = TOOL
         raise SrilmError(USAGE.format(tool=tool), 0 if "help" in flags else 2)
     if values["vocab"] == "-":
         raise SrilmError(f"{tool}: -vocab -: the vocabulary is read twice; name a file", 2)
-    from placerec.srilm.ngram import ngram
+    from placerec.srilm.tools.ngram import ngram
 
     words = WordList(lower="tolower" in flags)
     # Of the words that SRILM has in every vocabulary, only the markers stay without being named.

@@ -9,11 +9,11 @@ import numpy as np
 
 from placerec.arrays import Ints, Mask
 from placerec.lm.logs import LOG_ZERO
-from placerec.srilm.arpa_block import Block, parse_block
-from placerec.srilm.fields import Fields, NameTable
-from placerec.srilm.options import bounded_int, leading_float
-from placerec.srilm.streams import SPACES, Lines, SrilmError, Streams, tokens
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.model.arpa_lines import Block, parse_block
+from placerec.srilm.text.fields import Fields, NameTable
+from placerec.srilm.text.numbers import bounded_int, leading_float
+from placerec.srilm.text.streams import SPACES, Lines, SrilmError, Streams, tokens
+from placerec.srilm.text.vocabulary import WordList
 
 _MOST_ORDERS = 100
 _BLOCK = 1 << 19

@@ -1,6 +1,6 @@
 """The options of `ngram`: what works, and what is refused because our SRILM specification does not say what it does."""
 
-from placerec.srilm.options import Option, Options
+from placerec.srilm.tools.options import Option, Options
 
 
 def _refuse(reason: str, **kinds: str) -> dict[str, Option]:

@@ -11,10 +11,10 @@ from placerec.lm.logs import p_of
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
 from placerec.lm.score import TokenSequence
 from placerec.lm.vocabulary import SENTENCE_END
-from placerec.srilm.scorers import Scored, Scorer, View, event_numbers
-from placerec.srilm.sentences import Handling, Marked, Sentences, joined, mark, read_sentences
-from placerec.srilm.streams import Streams
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.model.scorers import Scored, Scorer, View, event_numbers
+from placerec.srilm.text.sentences import Handling, Marked, Sentences, joined, mark, read_sentences
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.text.vocabulary import WordList
 
 TOKENS, SUMS, RANKS = 2, 3, 4
 

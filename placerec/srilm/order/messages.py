@@ -8,7 +8,7 @@ from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LN10
 from placerec.lm.mutable import Trace
 from placerec.lm.trie import Trie
-from placerec.srilm.streams import Streams
+from placerec.srilm.text.streams import Streams
 
 # The place of each of some rows, int64, in the order in which SRILM comes by: (order, rows) -> places.
 ContextOrder = Callable[[int, Ints], Ints]

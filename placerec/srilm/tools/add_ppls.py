@@ -5,8 +5,8 @@ import re
 from collections.abc import Sequence
 
 from placerec.lm.logs import LN10
-from placerec.srilm.options import leading_float
-from placerec.srilm.streams import SrilmError, Streams, exit_status
+from placerec.srilm.text.numbers import leading_float
+from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 
 TOOL = "add-ppls"
 USAGE = "usage: {tool} [PPL ...]  (outputs of ngram -ppl; default: standard input)"

@@ -1,9 +1,9 @@
 """ARPA files for scoring only: as tables at once, where nothing about them is out of the ordinary."""
 
 from placerec.lm.score import Ngrams, ScoreTables, build_regular_tables
-from placerec.srilm.arpa_reader import Reader
-from placerec.srilm.streams import Streams
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.model.arpa_reader import Reader
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.text.vocabulary import WordList
 
 
 def read_tables(
@@ -14,7 +14,7 @@ def read_tables(
     reader.read()
     tables = _regular_tables(reader)
     if tables is None:
-        from placerec.srilm.arpa import assemble, tables_of
+        from placerec.srilm.model.arpa import assemble, tables_of
 
         tables = tables_of(assemble(reader)[0], words)
     else:

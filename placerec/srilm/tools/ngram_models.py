@@ -10,14 +10,14 @@ from placerec.lm.mix import merge, merge_weight
 from placerec.lm.mutable import MutableModel, reweigh, unite
 from placerec.lm.prune import prune, prune_improbable
 from placerec.lm.score import TokenSequence
-from placerec.srilm.arpa import read_model, tables_of
-from placerec.srilm.context_order import ContextTimes, message_order
-from placerec.srilm.messages import Messages
-from placerec.srilm.mixed_scorers import Cached, Lenient, LogLinear, Mixture
-from placerec.srilm.options import Parsed
-from placerec.srilm.scorers import Model, Null, Scorer
-from placerec.srilm.streams import Streams
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.model.arpa import read_model, tables_of
+from placerec.srilm.model.mixed_scorers import Cached, Lenient, LogLinear, Mixture
+from placerec.srilm.model.scorers import Model, Null, Scorer
+from placerec.srilm.order.contexts import ContextTimes, message_order
+from placerec.srilm.order.messages import Messages
+from placerec.srilm.text.streams import Streams
+from placerec.srilm.text.vocabulary import WordList
+from placerec.srilm.tools.options import Parsed
 
 
 class Models:

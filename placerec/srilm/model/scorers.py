@@ -13,7 +13,7 @@ import numpy as np
 from placerec.arrays import Ints, Mask, Singles
 from placerec.lm.score import Contexts, ScoreTables, TokenSequence, joint_log10_p
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.text.vocabulary import WordList
 
 Tag = Callable[[int], str]
 

@@ -24,8 +24,9 @@ from placerec.lm.discounts import (
     natural,
     witten_bell,
 )
-from placerec.srilm.options import Parsed, leading_float, leading_int
-from placerec.srilm.streams import SrilmError, Streams, tokens
+from placerec.srilm.text.numbers import leading_float, leading_int
+from placerec.srilm.text.streams import SrilmError, Streams, tokens
+from placerec.srilm.tools.options import Parsed
 
 # In the order in which an order without a method of its own inherits the general one.
 METHODS = ("ndiscount", "wbdiscount", "cdiscount", "addsmooth", "ukndiscount", "kndiscount")

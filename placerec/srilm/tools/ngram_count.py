@@ -12,14 +12,14 @@ from placerec.lm.estimation import estimate_mutable
 from placerec.lm.mutable import insert_prefixes
 from placerec.lm.prune import prune
 from placerec.lm.stored_text import StoredText
-from placerec.srilm.counts_file import Table, parse_count, read_counts
-from placerec.srilm.discounting import MODIFYING, Fitter, choose, given_method, meta_occurrences
-from placerec.srilm.estimation_messages import EstimationMessages
-from placerec.srilm.first_seen import FirstSeen
-from placerec.srilm.options import Option, Options, Parsed, parse
-from placerec.srilm.sentences import Handling, mark, read_sentences
-from placerec.srilm.streams import SrilmError, Streams, exit_status
-from placerec.srilm.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
+from placerec.srilm.order.estimation_messages import EstimationMessages
+from placerec.srilm.order.first_seen import FirstSeen
+from placerec.srilm.text.counts_file import Table, parse_count, read_counts
+from placerec.srilm.text.sentences import Handling, mark, read_sentences
+from placerec.srilm.text.streams import SrilmError, Streams, exit_status
+from placerec.srilm.text.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
+from placerec.srilm.tools.discounting import MODIFYING, Fitter, choose, given_method, meta_occurrences
+from placerec.srilm.tools.options import Option, Options, Parsed, parse
 
 TOOL = "ngram-count"
 

@@ -10,9 +10,9 @@ from placerec.lm.counts import NgramCounts
 from placerec.lm.stored_text import StoredText
 from placerec.lm.trie import Trie
 from placerec.lm.vocabulary import Vocabulary
-from placerec.srilm.counts_file import Table
-from placerec.srilm.hashing import first_positions, walk_order
-from placerec.srilm.vocabulary import WordList
+from placerec.srilm.order.hashing import first_positions, walk_order
+from placerec.srilm.text.counts_file import Table
+from placerec.srilm.text.vocabulary import WordList
 
 
 @dataclass(frozen=True)

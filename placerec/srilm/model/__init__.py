@@ -1,0 +1,1 @@
+"""Language models as SRILM reads, mixes and scores them."""

@@ -1,0 +1,1 @@
+"""SRILM's commands: options, the order of work, and what is printed."""
