@@ -1,4 +1,4 @@
-"""The command line: one file per command, which parses, calls one library function and shows what it gave."""
+"""The command line: each command parses, calls one library function and shows what it returned."""
 
 import io
 import os
@@ -9,24 +9,12 @@ from typing import Any
 
 import click
 
-from placerec.cli.calibrate import calibrate
-from placerec.cli.check import check
-from placerec.cli.compare import compare
-from placerec.cli.decode import decode
-from placerec.cli.demo import demo
-from placerec.cli.describe import describe
-from placerec.cli.evaluate import evaluate
-from placerec.cli.experiment import experiment
-from placerec.cli.inspect import inspect
-from placerec.cli.lab import lab
-from placerec.cli.show_frame import show_frame
-from placerec.cli.show_words import show_words
+from placerec.cli.beliefs import decode, evaluate
+from placerec.cli.experiments import compare, demo, experiment, lab
+from placerec.cli.images import describe, tokenize, train_words
+from placerec.cli.looking import show_frame, show_words, stability
+from placerec.cli.models import calibrate, check, inspect, train_lm, update
 from placerec.cli.srilm import SRILM_COMMANDS
-from placerec.cli.stability import stability
-from placerec.cli.tokenize import tokenize
-from placerec.cli.train_lm import train_lm
-from placerec.cli.train_words import train_words
-from placerec.cli.update import update
 from placerec.errors import PlacerecError
 from placerec.version import __version__
 

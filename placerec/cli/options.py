@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import json
 import logging
 import math
 import sys
@@ -302,6 +303,33 @@ def descriptor_options(function: Command) -> Command:
     return described
 
 
+def matrix_option(function: Command) -> Command:
+    """--descriptor npy:FILE alone. The command gets `matrix`, the file or None."""
+
+    @descriptor_option("The frames' descriptors, if those of the dictionary were computed elsewhere.")
+    @functools.wraps(function)
+    def described(*args: Any, descriptor: tuple[str, Path] | None, **options: Any) -> Any:
+        return function(*args, matrix=descriptor and descriptor[1], **options)
+
+    return described
+
+
+def size_option(default: int) -> Callable[[Command], Command]:
+    """--size: of the map."""
+    text = "Side of the map: size x size words."
+    return click.option("--size", type=click.IntRange(2, 200), default=default, show_default=True, help=text)
+
+
+def seed_option(text: str) -> Callable[[Command], Command]:
+    """--seed: 0 or above, 0 by default."""
+    return click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help=text)
+
+
+def tokens_argument(function: Command) -> Command:
+    """TOKENS...: files and folders of words."""
+    return click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH)(function)
+
+
 def words_option(required: bool, text: str) -> Callable[[Command], Command]:
     """-w: the visual dictionary."""
     return click.option("-w", "--words", metavar="words.npz", type=PATH, required=required, help=text)
@@ -316,6 +344,11 @@ def output_option(metavar: str, text: str, required: bool = True) -> Callable[[C
 def json_option(text: str = "Print JSON.") -> Callable[[Command], Command]:
     """--json: output for programs."""
     return click.option("--json", "as_json", is_flag=True, help=text)
+
+
+def echo_json(found: object) -> None:
+    """Print JSON for people and programs."""
+    click.echo(json.dumps(found, indent=2, ensure_ascii=False))
 
 
 _DECODING = (

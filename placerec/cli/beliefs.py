@@ -1,13 +1,15 @@
-"""`placerec decode`."""
+"""Beliefs over places: `placerec decode` and `evaluate`."""
 
+import json
 import sys
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from placerec.cli.options import (
+    FILE,
     PATH,
     PATH_OR_STREAM,
     decoding_options,
@@ -21,7 +23,6 @@ from placerec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from placerec.frames import SourceOptions
     from placerec.model import Decoding
 
 # What stands in placerec.methods.METHODS, where reading it would load numpy.
@@ -37,6 +38,7 @@ METHODS = (
     "mtd",
     "second-order",
 )
+_STDIN = Path("-")
 
 
 @click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
@@ -69,18 +71,7 @@ METHODS = (
     "beliefs/", "The folder to write: one file per sequence. Without it, one sequence goes to stdout.", False
 )
 @talk_options
-def decode(
-    tokens: tuple[Path | str, ...],
-    model: Path,
-    words: Path | None,
-    source_options: "SourceOptions",
-    live: bool,
-    method: str,
-    scorer: str,
-    as_json: bool,
-    out: Path | None,
-    options: "Decoding",
-) -> None:
+def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: Any) -> None:
     """Find the belief over places for every frame.
 
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, any SOURCE that tokenize takes:
@@ -88,57 +79,56 @@ def decode(
     and answers each at once. With -w and --live, TOKENS is a camera (camera:0, camera:/dev/video2,
     camera:rtsp://...) or a video; frames that come too fast are dropped, and Ctrl-C ends it.
     """
-    from placerec.hohmm import format_beliefs
-    from placerec.methods import check_method, decode_lines, decode_live, load_decoder
-    from placerec.methods import decode as run
+    from placerec.methods import check_method
 
     with usage("--method"):
-        check_method(method, options, scorer=scorer)
+        check_method(how["method"], how["options"], scorer=how["scorer"])
+    words = how["words"]
     if live:
-        if words is None or len(tokens) > 1 or Path("-") in tokens:
+        if words is None or len(tokens) > 1 or _STDIN in tokens:
             raise click.UsageError("--live takes one camera or video, and needs -w to see it")
-        _check_answering("--live", out, options)
-        answers = decode_live(
-            tokens[0],
-            model,
-            words=words,
-            method=method,
-            source_options=source_options,
-            options=options,
-            scorer=scorer,
-            as_json=as_json,
-        )
-        with closing(answers):
-            for line in answers:
-                click.echo(line)
-        return
-    if tokens == (Path("-"),) and words is None:
-        _check_answering("`-`", out, options)
-        if sys.stdin is None:
-            raise click.UsageError("`-` reads standard input, and that is closed")
-        recognizer = load_decoder(method, model, options=options, scorer=scorer)
-        for line in decode_lines(recognizer, sys.stdin, as_json=as_json):
-            click.echo(line)
-        return
-    if Path("-") in tokens and words is None:
+        _check_answering("--live", out, how["options"])
+        _answer_frames(tokens[0], **how)
+    elif tokens == (_STDIN,) and words is None:
+        _check_answering("`-`", out, how["options"])
+        _answer_lines(**how)
+    elif _STDIN in tokens and words is None:
         raise click.UsageError("`-` cannot be mixed with files")
-    if options.explain and out is None:
+    else:
+        _decode_whole(tokens, out, **how)
+
+
+def _answer_frames(source: Path | str, model: Path, **how: Any) -> None:
+    """An answer for each frame of a camera or a video, as it comes."""
+    from placerec.methods import decode_live
+
+    with closing(decode_live(source, model, **how)) as answers:
+        for line in answers:
+            click.echo(line)
+
+
+def _answer_lines(*, model: Path, method: str, options: "Decoding", scorer: str, as_json: bool, **_: Any) -> None:
+    """An answer for each line of standard input, as it is read."""
+    from placerec.methods import decode_lines, load_decoder
+
+    if sys.stdin is None:
+        raise click.UsageError("`-` reads standard input, and that is closed")
+    decoder = load_decoder(method, model, options=options, scorer=scorer)
+    for line in decode_lines(decoder, sys.stdin, as_json=as_json):
+        click.echo(line)
+
+
+def _decode_whole(tokens: tuple[Path | str, ...], out: Path | None, *, model: Path, **how: Any) -> None:
+    """The beliefs of whole sequences: files in `out`, or the one sequence on stdout."""
+    from placerec.hohmm import format_beliefs
+    from placerec.methods import decode as run
+
+    if how["options"].explain and out is None:
         raise click.UsageError("--explain writes files beside the beliefs: it needs -o")
     with progress_bar("describe") as progress:
-        beliefs = run(
-            tokens,
-            model,
-            method=method,
-            words=words,
-            out=out,
-            source_options=source_options,
-            options=options,
-            scorer=scorer,
-            as_json=as_json,
-            progress=progress,
-        )
+        beliefs = run(tokens, model, out=out, progress=progress, **how)
     if out is None:
-        click.echo(format_beliefs(beliefs[0], as_json=as_json), nl=False)
+        click.echo(format_beliefs(beliefs[0], as_json=how["as_json"]), nl=False)
 
 
 def _check_answering(what: str, out: Path | None, options: "Decoding") -> None:
@@ -149,3 +139,28 @@ def _check_answering(what: str, out: Path | None, options: "Decoding") -> None:
         raise click.UsageError(
             f"{what} answers each frame before later words are known: it takes none of --smooth, --viterbi, --lag"
         )
+
+
+@click.command(epilog="Example: placerec evaluate beliefs/*.tsv --plot beliefs.png")
+@click.argument("beliefs", metavar="BELIEFS...", nargs=-1, required=True, type=PATH_OR_STREAM)
+@json_option()
+@click.option(
+    "--plot",
+    metavar="FILE.png",
+    type=FILE,
+    help="Draw beliefs against the truth, what was confused, and how far to trust them: .png, .svg or .pdf.",
+)
+@talk_options
+def evaluate(beliefs: tuple[Path, ...], as_json: bool, plot: Path | None) -> None:
+    """Judge beliefs by the true places.
+
+    BELIEFS are files of decode (.tsv), folders of them, or `-`. Prints the accuracy beside that of the majority class,
+    recall and precision per place, the confusion matrix, and how good the beliefs are as probabilities.
+    """
+    from placerec.evaluation import format_evaluation
+    from placerec.figures import evaluate_files
+
+    if _STDIN in beliefs and sys.stdin is None:
+        raise click.UsageError("`-` reads standard input, and that is closed")
+    evaluation = evaluate_files(beliefs, plot=plot)
+    click.echo(json.dumps(evaluation.to_json(), indent=2) if as_json else format_evaluation(evaluation))

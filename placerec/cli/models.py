@@ -1,0 +1,209 @@
+"""Models of places: `placerec train-lm`, `update`, `calibrate`, `inspect` and `check`."""
+
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from placerec.cli.options import (
+    PATH,
+    FiniteRange,
+    cluster_option,
+    decoding_options,
+    echo_json,
+    json_option,
+    output_option,
+    progress_bar,
+    talk_options,
+    tokens_argument,
+    usage,
+)
+
+if TYPE_CHECKING:
+    from placerec.jobs import Executor
+    from placerec.model import Decoding
+
+# The names of placerec.lm.SMOOTHINGS, written out: importing it would make --help wait for numpy.
+SMOOTHING_NAMES = tuple(
+    name + suffix
+    for name in ("witten-bell", "lidstone", "absolute", "kneser-ney", "modified-kneser-ney")
+    for suffix in ("", "-backoff")
+)
+INSPECT_EXAMPLES = """\b
+Example: placerec inspect model/kitchen.arpa "w07 w08"
+         placerec inspect beliefs/run3.explain.jsonl 153 -o decision.html
+"""
+_model_argument = click.argument("model", metavar="MODEL/", type=PATH)
+
+
+@click.command("train-lm", epilog="Example: placerec train-lm tokens/seq*[12].tsv -o model/ --order 2")
+@tokens_argument
+@click.option(
+    "--order", type=click.IntRange(1, 9), default=2, show_default=True, help="n-gram order; 1 is the classical HMM."
+)
+@click.option(
+    "--smoothing",
+    type=click.Choice(SMOOTHING_NAMES),
+    default="witten-bell",
+    show_default=True,
+    help="How unseen n-grams get their probability.",
+)
+@click.option(
+    "--delta",
+    type=FiniteRange(0, min_open=True),
+    help="What lidstone adds to every count  [default: 1], or absolute takes off it  [default: 0.5].",
+)
+@click.option(
+    "--select",
+    default="none",
+    show_default=True,
+    metavar="RULE",
+    help="Which words count: none (all), unique (one a run), subsample:S (one in S), compress:M (runs by M).",
+)
+@click.option(
+    "--min-count",
+    default="1",
+    show_default=True,
+    metavar="N[,N...]|srilm",
+    help="Per order, how often an n-gram must occur to be listed; srilm is 1,1,2.",
+)
+@click.option(
+    "--markers/--no-markers", default=False, show_default=True, help="Whether to count <s> and </s> around visits."
+)
+@click.option("--vocab", metavar="FILE", type=PATH, help="All words, one a line.  [default: vocab.txt beside TOKENS]")
+@output_option("MODEL/", "The folder to write: one ARPA file per place, and what made it.")
+@cluster_option
+@talk_options
+def train_lm(
+    tokens: tuple[Path, ...],
+    select: str,
+    min_count: str,
+    vocab: Path | None,
+    out: Path,
+    work: "Executor | None",
+    **options: Any,
+) -> None:
+    """Train one n-gram model per place, as ARPA files.
+
+    TOKENS are token streams (.tsv), folders of them, or one folder of sentences: PLACE.txt, one visit a line.
+    """
+    from placerec.model import ModelOptions, parse_min_count
+    from placerec.model import train_lm as run
+    from placerec.words import parse_selection
+
+    with usage("--min-count"):
+        minima = parse_min_count(min_count)
+    with usage("--select"):
+        selection = parse_selection(select)
+    chosen = ModelOptions(min_count=minima, select=selection, **options)
+    with progress_bar("train-lm") as progress:
+        run(tokens, out, options=chosen, vocabulary=vocab, work=work, progress=progress)
+
+
+@click.command(epilog="Example: placerec update model/ tokens/today.tsv")
+@_model_argument
+@tokens_argument
+@click.option("--forget", is_flag=True, help="Take these sequences away instead; they must have been learned.")
+@talk_options
+def update(model: Path, tokens: tuple[Path, ...], forget: bool) -> None:
+    """Learn more labelled visits, or forget some.
+
+    TOKENS are token streams (.tsv) or folders of them; for a model of sentences, one folder of sentences. The old ones
+    are not needed: MODEL/ will be as if train-lm had been given all sequences, the old ones first.
+    """
+    from placerec.model import update as run
+
+    with progress_bar("update") as progress:
+        run(model, tokens, forget=forget, progress=progress)
+
+
+@click.command(epilog="Example: placerec calibrate model/ tokens/run4.tsv tokens/run5.tsv")
+@_model_argument
+@tokens_argument
+@decoding_options()
+@talk_options
+def calibrate(model: Path, tokens: tuple[Path, ...], options: "Decoding") -> None:
+    """Learn how far the beliefs of a model can be trusted.
+
+    TOKENS are labelled token streams that trained neither the words nor the model. The temperature that is found is
+    kept in MODEL/model.json; it holds for `decode --calibrated` with the same options as here.
+    """
+    from placerec.model import calibrate as run
+
+    found = run(model, tokens, options=options)
+    before, after = found.log_loss_before, found.log_loss_after
+    click.echo(f"temperature  {found.temperature:.3f}   (above 1: the beliefs were too sure)")
+    click.echo(
+        f"log loss     {before:.3f} -> {after:.3f}   (nats per frame, {found.frames} frames: those it was fitted on)"
+    )
+
+
+@click.command(epilog=INSPECT_EXAMPLES)
+@click.argument("path", metavar="MODEL.arpa|NAME.explain.jsonl", type=PATH)
+@click.argument("asked", metavar="[NGRAM...|FRAME]", nargs=-1)
+@click.option(
+    "--top", type=click.IntRange(min=0), default=5, show_default=True, help="How many n-grams of each order to show."
+)
+@json_option()
+@output_option("FILE.html", "A page of the decision to write, too.", required=False)
+@talk_options
+def inspect(path: Path, asked: tuple[str, ...], top: int, as_json: bool, out: Path | None) -> None:
+    """Read a model, or one decision of `decode --explain`.
+
+    Of a model: counts, top n-grams, sums, p(w | h). NGRAM is some words in quotes: the probability of the last one
+    after the others is shown step by step. Of the decision at FRAME (its name, or the beginning of it): what each
+    place's model said of the word, what that made of the belief, and which of the last words speak for the best place
+    and against it.
+    """
+    if path.name.endswith(".jsonl"):
+        found, text = _decision(path, asked, out)
+    else:
+        if out is not None:
+            raise click.UsageError("-o is for the page of a decision (NAME.explain.jsonl FRAME); leave it out")
+        found, text = _model(path, asked, top)
+    echo_json(found) if as_json else click.echo(text)
+
+
+def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[object, str]:
+    from placerec.inspection.decision import format_decision, inspect_decision
+
+    if click.get_current_context().get_parameter_source("top") is not ParameterSource.DEFAULT:
+        raise click.UsageError("--top is for models; leave it out")
+    if len(asked) != 1:
+        raise click.UsageError(f"name one frame of {path}, as in its column `frame` of the beliefs")
+    decision = inspect_decision(path, asked[0], out=out)
+    return decision, format_decision(decision)
+
+
+def _model(path: Path, asked: tuple[str, ...], top: int) -> tuple[object, str]:
+    from placerec.lm.inspect import format_inspection, inspect_model
+
+    inspection = inspect_model(path, asked, top=top)
+    return inspection, format_inspection(inspection)
+
+
+@click.command(epilog="Example: placerec check model/*.arpa")
+@click.argument("models", metavar="MODEL.arpa...", nargs=-1, required=True, type=PATH)
+@json_option()
+@talk_options
+def check(models: tuple[Path, ...], as_json: bool) -> None:
+    """Check that a model sums to 1 and agrees with KenLM.
+
+    The probabilities after every context must sum to 1, and KenLM must give every token the same one.
+    """
+    from placerec.lm.check import check_model
+
+    checks = []
+    for path in models:
+        checks.append(check_model(path))
+        if not as_json:
+            click.echo(checks[-1].sentence())
+    if as_json:
+        click.echo(json.dumps([asdict(found) | {"ok": found.ok} for found in checks], indent=2))
+    if not all(found.ok for found in checks):
+        click.echo("placerec: a model is not as it should be; see above", err=True)
+        sys.exit(1)
