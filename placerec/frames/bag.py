@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,10 +64,7 @@ class Bag:
     every: int
     ranks: "array[int]" = field(repr=False, compare=False)
     listed: tuple[Frame, ...] = field(repr=False, compare=False)
-
-    @property
-    def endless(self) -> bool:
-        return False
+    endless: ClassVar[bool] = False
 
     def files(self) -> list[Path]:
         return sorted(path for path in self.path.iterdir() if path.is_file()) if self.path.is_dir() else [self.path]

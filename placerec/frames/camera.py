@@ -15,7 +15,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from placerec.errors import SourceError
 from placerec.frames.image import quiet
@@ -41,10 +41,7 @@ class Camera:
 
     source: str
     every: int = 1
-
-    @property
-    def endless(self) -> bool:
-        return True
+    endless: ClassVar[bool] = True
 
     @property
     def path(self) -> Path:

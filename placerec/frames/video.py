@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from placerec.errors import SourceError
 from placerec.frames.image import as_gray, quiet
@@ -35,10 +35,7 @@ class Video:
     every: int
     times: "array[float]" = field(repr=False, compare=False)
     listed: tuple[Frame, ...] = field(repr=False, compare=False)
-
-    @property
-    def endless(self) -> bool:
-        return False
+    endless: ClassVar[bool] = False
 
     def files(self) -> list[Path]:
         return [self.path]

@@ -39,6 +39,15 @@ def chunks(source: Source) -> Iterator[Singles]:
         yield np.concatenate(waiting)
 
 
+def first_unusable(rows: Singles) -> int | None:
+    """The first row that holds NaN or infinite values, None if there is none."""
+    for number, part in enumerate(chunks(rows)):
+        good = np.isfinite(part).all(axis=1)
+        if not good.all():
+            return number * CHUNK + int(good.argmin())
+    return None
+
+
 class SpooledRows:
     """The chunks of a source, kept for any number of passes; as a stream, too.
 

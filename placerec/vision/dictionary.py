@@ -14,7 +14,7 @@ from placerec.errors import VisionError
 from placerec.frames.sequence import Gray
 from placerec.jobs import Executor
 from placerec.version import __version__
-from placerec.vision.chunks import CHUNK, Source, chunks, spooled
+from placerec.vision.chunks import Source, chunks, first_unusable, spooled
 from placerec.vision.describe import Descriptors
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
 from placerec.vision.som import RULES, WIDTH, EpochProgress, MapQuality, Units, map_quality, nearest_units, train_som
@@ -258,11 +258,9 @@ def _check(descriptors: Singles, spec: DescriptorSpec, first: int = 0) -> Single
     if rows.shape[1] != spec.length:
         raise VisionError(f"the descriptors have {rows.shape[1]} values, and the dictionary's have {spec.length}")
     rows = rows.astype(np.float32, copy=False)
-    for start in range(0, len(rows), CHUNK):
-        good = np.isfinite(rows[start : start + CHUNK]).all(axis=1)
-        if not good.all():
-            row = first + start + int(good.argmin())
-            raise VisionError(f"descriptor {row} (from 0) holds NaN or infinite values; leave it out")
+    bad = first_unusable(rows)
+    if bad is not None:
+        raise VisionError(f"descriptor {first + bad} (from 0) holds NaN or infinite values; leave it out")
     return rows
 
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from placerec.arrays import Singles
 from placerec.errors import VisionError
+from placerec.vision.chunks import first_unusable
 from placerec.vision.exact import TERMS
 from placerec.vision.storage import reading
 
 Name = tuple[str, str]  # of the sequence, of the frame
-_CHUNK = 4096
 
 
 def read_rows(path: Path, frames: Sequence[Name]) -> tuple[Singles, list[int]]:
@@ -44,7 +44,7 @@ def read_rows(path: Path, frames: Sequence[Name]) -> tuple[Singles, list[int]]:
         # What overflows becomes infinite, and is named.
         with np.errstate(over="ignore"):
             values = matrix.astype(np.float32, copy=False)
-        bad = _first_bad(values)
+        bad = first_unusable(values)
         if bad is not None:
             frame = "/".join(frames[kept[bad]])
             raise VisionError(f"row {rows[bad]} (from 0), of {frame}, holds NaN or infinite values; compute it again")
@@ -90,11 +90,3 @@ def _rows_named(names: Sequence[Name], frames: Sequence[Name]) -> tuple[list[int
             raise VisionError(f"has no rows for the sequence {sequence!r}; it names {', '.join(sorted(known)[:5])}")
     kept = [k for k, name in enumerate(frames) if name in where]
     return [where[frames[k]] for k in kept], kept
-
-
-def _first_bad(values: Singles) -> int | None:
-    for first in range(0, len(values), _CHUNK):
-        good = np.isfinite(values[first : first + _CHUNK]).all(axis=1)
-        if not good.all():
-            return first + int(good.argmin())
-    return None
