@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.hohmm import Beliefs
+from placerec.model import ModelOptions, train_lm
 from placerec.words import WordStream, write_stream, write_vocabulary
 
 PLACES = ("hall", "kitchen", "office")
@@ -55,6 +56,13 @@ def write_tokens(folder: Path, names: Sequence[str] = ("run1", "run2", "run3")) 
         write_stream(run_through(name, seed), folder / f"{name}.tsv")
     write_vocabulary(VOCABULARY, folder / "vocab.txt")
     return folder
+
+
+def write_world(root: Path, names: Sequence[str] = ("run1", "run2", "run3"), **options: Any) -> Path:
+    """`root` with the tokens of some runs, and a model, made with these options, of run1 and run2."""
+    tokens = write_tokens(root / "tokens", names)
+    train_lm([tokens / "run1.tsv", tokens / "run2.tsv"], root / "model", options=ModelOptions(**options))
+    return root
 
 
 def write_images(folder: Path, seed: int = 0, frames: int = 12) -> Path:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.filter_cases import transitions
+from helpers.small_models import WORDS, corpora, models_of, novelty, selections
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,25 +27,11 @@ from placerec.hohmm import (
     fixed_transition,
     learned_transition,
 )
-from placerec.hohmm.unknown import DistanceModel, UnknownModel
+from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
 from placerec.words import Selection, WordStream
 
-WORDS = ["a", "b", "c", "d"]
 streams = st.lists(st.sampled_from(WORDS), max_size=30)
-corpora = st.lists(st.lists(st.lists(st.sampled_from(WORDS), max_size=6), max_size=4), min_size=1, max_size=4)
-selections = st.sampled_from([Selection(), Selection("subsample", 3), Selection("compress", 2), Selection("unique")])
-
-
-def models_of(corpus: list[list[list[str]]], order: int) -> dict[str, BackoffModel]:
-    return {
-        f"place{i}": estimate(
-            count_ngrams(sentences, order, vocabulary=WORDS, markers=False),
-            smoothing("witten-bell"),
-            non_events=["</s>"],
-        )
-        for i, sentences in enumerate(corpus)
-    }
 
 
 def as_twin(model: BackoffModel) -> reference.Model:
@@ -155,10 +142,6 @@ def test_online_is_batch_for_all_options(
 
 
 FAR = Calibration(2.5, 1, 0.0, 0.0)
-
-
-def novelty(places: int) -> UnknownModel:
-    return UnknownModel(len(WORDS), 0.5, DistanceModel(np.linspace(0, 1, places), 0.3))
 
 
 @given(situations(), st.data())

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.small_world import PLACES, write_tokens
+from helpers.small_world import PLACES, write_world
 
 from placerec.errors import ModelError, OutputError, StreamError
 from placerec.hohmm import format_beliefs, read_beliefs
@@ -19,9 +19,7 @@ from placerec.words import Selection, parse_selection, read_stream
 @pytest.fixture
 def world(tmp_path: Path) -> Path:
     """Tokens of three runs, and a model of the first two."""
-    write_tokens(tmp_path / "tokens")
-    train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model")
-    return tmp_path
+    return write_world(tmp_path)
 
 
 def test_selection_is_applied_at_test_too(world: Path) -> None:

@@ -9,22 +9,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.small_world import PLACES, write_tokens
+from helpers.small_world import PLACES, write_world
 
 from placerec.errors import ModelError, StreamError
 from placerec.hohmm import fixed_transition, learned_transition
 from placerec.methods import decode, decode_lines, load_decoder
-from placerec.model import Decoding, ModelOptions, load_model, load_recognizer, train_lm, transition_of
+from placerec.model import Decoding, load_model, load_recognizer, train_lm, transition_of
 from placerec.words import parse_selection, read_stream
 
 
 @pytest.fixture
 def world(tmp_path: Path) -> Path:
     """Tokens of three runs, and a model of the first two."""
-    write_tokens(tmp_path / "tokens")
-    options = ModelOptions(select=parse_selection("unique"))
-    train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model", options=options)
-    return tmp_path
+    return write_world(tmp_path, select=parse_selection("unique"))
 
 
 def belief(world: Path, options: Decoding) -> np.ndarray[Any, np.dtype[np.float64]]:

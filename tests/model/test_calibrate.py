@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.small_world import run_through, with_columns, write_tokens
+from helpers.small_world import run_through, with_columns, write_world
 
 from placerec.errors import ModelError, StreamError
 from placerec.evaluation import evaluate
 from placerec.hohmm import Calibration
 from placerec.methods import decode
-from placerec.model import Decoding, calibrate, load_model, train_lm
+from placerec.model import Decoding, calibrate, load_model
 from placerec.words import write_stream
 
 STAY_09 = {
@@ -32,9 +32,7 @@ NAMES = tuple(f"run{number}" for number in range(1, 6))
 @pytest.fixture
 def world(tmp_path: Path) -> Path:
     """Tokens of five runs, and a model of the first two."""
-    write_tokens(tmp_path / "tokens", NAMES)
-    train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model")
-    return tmp_path
+    return write_world(tmp_path, NAMES)
 
 
 def described(model: Path) -> dict[str, Any]:

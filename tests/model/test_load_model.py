@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.small_world import PLACES, VOCABULARY, write_tokens
+from helpers.small_world import PLACES, VOCABULARY, write_world
 
 from placerec.errors import LanguageModelError, ModelError, PlacerecError
 from placerec.model import Decoding, ModelOptions, load_model, load_recognizer, train_lm
@@ -17,9 +17,7 @@ from placerec.words import Selection
 @pytest.fixture
 def world(tmp_path: Path) -> Path:
     """Tokens of three runs, and a model of the first two."""
-    write_tokens(tmp_path / "tokens")
-    train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model")
-    return tmp_path
+    return write_world(tmp_path)
 
 
 def refused(message: str, model: Path, error: type[PlacerecError] = ModelError) -> None:

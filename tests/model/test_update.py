@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.small_world import PLACES, VOCABULARY, run_through, write_tokens
+from helpers.small_world import PLACES, VOCABULARY, run_through, write_tokens, write_world
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -111,9 +111,7 @@ def test_what_cannot_be_estimated_leaves_the_model(tmp_path: Path) -> None:
 @pytest.fixture
 def world(tmp_path: Path) -> Path:
     """Token streams of three runs, and a model of the first two."""
-    tokens = write_tokens(tmp_path / "tokens")
-    train_lm([tokens / "run1.tsv", tokens / "run2.tsv"], tmp_path / "model")
-    return tmp_path
+    return write_world(tmp_path)
 
 
 def refused(
