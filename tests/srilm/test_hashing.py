@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from placerec.lm.counts import count_text
 from placerec.lm.stored_text import StoredText
-from placerec.srilm.order.hashing import capacities, first_positions, needed, slot_order, walk_order
+from placerec.srilm.order.counts import FirstSeen
+from placerec.srilm.order.hashing import capacities, needed, table_order
 from placerec.srilm.text.streams import tokens
 from placerec.srilm.text.vocabulary import WordList
 
@@ -64,6 +65,11 @@ def insert(slots: list[int | None], place: int, key: int) -> list[int | None]:
     return slots
 
 
+def in_one_table(keys: list[int], size_hint: int = 0) -> list[int]:
+    order = table_order(np.zeros(len(keys), np.int64), np.array(keys, np.uint64), size_hint=size_hint)
+    return [int(place) for place in order]
+
+
 def test_capacities_are_those_of_section_15() -> None:
     entries = np.arange(1, 14)
     assert capacities(entries).tolist() == [1, 2, 4, 4, 8, 8, 8, 16, 16, 16, 16, 16, 32]
@@ -71,29 +77,28 @@ def test_capacities_are_those_of_section_15() -> None:
 
 
 def test_small_tables_keep_the_order_of_insertion() -> None:
-    assert slot_order([9, 3, 7, 1]) == [0, 1, 2, 3]
+    assert in_one_table([9, 3, 7, 1]) == [0, 1, 2, 3]
 
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.integers(0, 400), unique=True, max_size=150), st.sampled_from([0, 3, 5, 40, 300]))
 def test_all_at_once_equals_entry_by_entry(keys: list[int], size_hint: int) -> None:
-    assert slot_order(keys, size_hint) == plain_order(keys, size_hint)
+    assert in_one_table(keys, size_hint) == plain_order(keys, size_hint)
 
 
 def test_a_large_table_equals_entry_by_entry() -> None:
     keys = np.random.default_rng(0).permutation(5000).tolist()
-    assert slot_order(keys) == plain_order(keys)
+    assert in_one_table(keys) == plain_order(keys)
 
 
-def read_sentences(path: Path, words: WordList) -> tuple[list[int], list[int]]:
-    """SRILM's word numbers of a text, in sentences between <s> and </s>, and the lengths of these."""
-    numbers: list[int] = []
-    lengths: list[int] = []
+def text_of(path: Path, words: WordList) -> StoredText:
+    """A text as SRILM's word numbers, in sentences between <s> and </s>."""
+    text = StoredText()
     for line in path.read_text("latin-1").split("\n"):
         if found := tokens(line):
-            numbers += [words.add(word) for word in ["<s>", *found, "</s>"]]
-            lengths.append(len(found) + 2)
-    return numbers, lengths
+            numbers = [words.add(word) for word in ["<s>", *found, "</s>"]]
+            text.add(np.array(numbers), np.array([len(numbers)]))
+    return text
 
 
 @pytest.mark.parametrize("case_id", UNSORTED)
@@ -108,24 +113,13 @@ def test_unsorted_counts_come_in_the_order_of_srilm(case_id: str, shared: Path) 
     expected = gzip.decompress(packed.read_bytes()) if packed.exists() else (folder / name).read_bytes()
 
     words = WordList()
-    numbers, lengths = read_sentences(golden / case["inputs"][0], words)
-    vocabulary, renumbered = words.sorted()
-    text, sorted_number = StoredText(), np.array(renumbered)
-    text.add(np.array(numbers), np.array(lengths))
+    text = text_of(golden / case["inputs"][0], words)
+    vocabulary, sorted_number = words.sorted()
     counts = count_text(text, order, vocabulary, renumbered=sorted_number)
-    first = first_positions(text, counts.trie, sorted_number)
-    orders, rows = walk_order(counts.trie, counts.seen, first, np.argsort(renumbered))
-    texts = [counts.trie.texts(n) for n in range(1, order + 1)]
-    shown = [
-        f"{texts[n - 1][row]}\t{counts.counts[n - 1][row]}\n"
-        for n, row in zip(orders.tolist(), rows.tolist(), strict=True)
-    ]
-    assert "".join(shown).encode("latin-1") == expected
+    assert FirstSeen([], text, words).format(counts).encode("latin-1") == expected
 
 
 def test_a_walk_of_nothing_is_empty() -> None:
-    vocabulary, renumbered = WordList().sorted()
-    counts = count_text(StoredText(), 3, vocabulary)
-    first = first_positions(StoredText(), counts.trie, np.array(renumbered))
-    orders, rows = walk_order(counts.trie, counts.seen, first, np.arange(len(vocabulary)))
-    assert orders.tolist() == rows.tolist() == []
+    words = WordList()
+    counts = count_text(StoredText(), 3, words.sorted()[0])
+    assert FirstSeen([], StoredText(), words).format(counts) == ""

@@ -71,7 +71,6 @@ def test_the_same_words_packed_and_plain(tmp_path: Path) -> None:
     (tmp_path / "a.bz2").write_bytes(bz2.compress(b"a\nb\n"))
     for path in tmp_path.iterdir():
         assert list(ours.lines(str(path))) == ["a", "b"]
-        assert ours.read(str(path)) == b"a\nb\n"
 
 
 @pytest.mark.parametrize(("name", "magic"), [("x.gz", b"\x1f\x8b"), ("x.bz2", b"BZh"), (".gz", b"a\n"), ("x", b"a\n")])
@@ -83,7 +82,7 @@ def test_names_say_how_output_is_packed(
     ours.write(name, "a\n")
     first = (tmp_path / name).read_bytes()
     assert first.startswith(magic)
-    assert ours.read(name) == b"a\n"
+    assert list(ours.lines(name)) == ["a"]
     ours.write(name, "a\n")
     assert (tmp_path / name).read_bytes() == first
 
@@ -91,7 +90,7 @@ def test_names_say_how_output_is_packed(
 @pytest.mark.parametrize("suffix", [".Z", ".7z", ".xz"])
 def test_other_packers_are_refused(suffix: str) -> None:
     with pytest.raises(SrilmError, match=f"x{suffix}: placerec does not read or write {suffix} files") as caught:
-        streams()[0].read(f"x{suffix}")
+        streams()[0].open(f"x{suffix}")
     assert caught.value.status == 2
 
 
@@ -105,7 +104,7 @@ def test_damaged_gzip_is_an_error_with_the_name(cut: int, tmp_path: Path) -> Non
 
 def test_a_missing_file_and_folder(tmp_path: Path) -> None:
     missing = str(tmp_path / "none" / "x")
-    for act in (lambda: streams()[0].read(missing), lambda: streams()[0].write(missing, "")):
+    for act in (lambda: streams()[0].open(missing), lambda: streams()[0].write(missing, "")):
         with pytest.raises(SrilmError, match=f"^{missing}: No such file or directory$") as caught:
             act()
         assert caught.value.status == 1
@@ -115,7 +114,7 @@ def test_hyphen_twice_is_warned_of_once() -> None:
     ours, out, err = streams(b"a\n")
     for _ in range(3):
         ours.write("-", "b\n")
-    assert [ours.read("-") for _ in range(3)] == [b"a\n", b"", b""]
+    assert [list(ours.lines("-")) for _ in range(3)] == [["a"], [], []]
     assert out.getvalue() == b"b\nb\nb\n"
     assert err.getvalue().decode().splitlines() == [
         "warning: '-' used multiple times for output",

@@ -43,8 +43,7 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTi
 
     `expected`: the size of vocabulary that SRILM makes the model for.
     """
-    vocabulary, renumbered = reader.words.sorted()
-    sorted_number = np.array(renumbered, np.int64)
+    vocabulary, sorted_number = reader.words.sorted()
     blocks = [(n, block) for n, its in sorted(reader.blocks.items()) for block in its]
     groups = [sorted_number[block.words] for _, block in blocks]
     trie, rows = closed_trie(vocabulary, reader.order, groups)

@@ -9,6 +9,7 @@ import numpy as np
 
 from placerec.arrays import Ints, Mask
 from placerec.lm.logs import LOG_ZERO
+from placerec.lm.score import Ngrams, ScoreTables, build_regular_tables
 from placerec.srilm.model.arpa_lines import Block, parse_block
 from placerec.srilm.text.fields import Fields, NameTable
 from placerec.srilm.text.numbers import bounded_int, leading_float
@@ -257,6 +258,33 @@ class Reader:
             line = min(predicted)
             message = f"warning: non-zero probability for {words.unknown} in closed-vocabulary LM"
             self.said.append((line, 0, f"{self.name}: line {line}: {message}"))
+
+
+def read_tables(
+    name: str, words: WordList, streams: Streams, *, order: int, debug: int = 0, limited: bool = False
+) -> ScoreTables:
+    """Read an ARPA file as `read_model` does: the same words, messages, errors and probabilities."""
+    reader = Reader(name, words, streams, order, limited)
+    reader.read()
+    tables = _regular_tables(reader)
+    if tables is None:
+        from placerec.srilm.model.arpa import assemble, tables_of
+
+        tables = tables_of(assemble(reader)[0], words)
+    else:
+        reader.warn_of_unknown()
+    reader.finish(debug, "lm file")
+    return tables
+
+
+def _regular_tables(reader: Reader) -> ScoreTables | None:
+    """None after a failure, and where the orders do not follow each other."""
+    ends = [line for _, its in sorted(reader.blocks.items()) for block in its for line in block.lines[[0, -1]].tolist()]
+    if reader.failure or not reader.blocks or ends != sorted(ends):
+        return None
+    orders = [reader.blocks.get(n, []) for n in range(1, min(reader.order, reader.top) + 1)]
+    columns = [[Ngrams(block.words, block.log10_p, block.backoff, block.weighted) for block in its] for its in orders]
+    return build_regular_tables(len(reader.words.words), columns)
 
 
 def _signed(text: str) -> int:

@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask
-from placerec.lm.counts import occurrences
-from placerec.lm.stored_text import StoredText
 from placerec.lm.trie import Trie
 
 _SMALL = 8
@@ -32,20 +30,11 @@ def capacities(entries: Ints) -> Ints:
     return 1 << np.ceil(np.log2(np.maximum(needed(entries), 1))).astype(np.int64)
 
 
-def slot_order(keys: Sequence[int] | NDArray[np.uint64], size_hint: int = 0) -> list[int]:
-    """The order in which a table gives back its entries: their places in `keys`, which come in order of insertion.
-
-    `size_hint`: the number of entries that the table was created for (0: created empty).
-    """
-    wanted = np.array(keys, np.uint64)
-    return [int(place) for place in table_order(np.zeros(len(wanted), np.int64), wanted, size_hint=size_hint)]
-
-
 def table_order(table: Ints, keys: NDArray[np.uint64], *, size_hint: int = 0) -> Ints:
     """The entries of several tables in the order in which these give them back, table after table: places int64 (E,).
 
     `table` int64 (E,), ascending from 0: the table of each entry; `keys` uint64 (E,). The entries of a table come in
-    order of insertion. `size_hint` as in `slot_order`, for all tables.
+    order of insertion. `size_hint`: the number of entries that each table was created for (0: created empty).
     """
     order = np.arange(len(table))
     size = np.bincount(table) if len(table) else np.zeros(0, np.int64)
@@ -138,19 +127,3 @@ def _subtrees(rows: Sequence[Ints], parents: Sequence[Ints], sizes: Sequence[int
         counted = np.bincount(parents[n - 1], weights=below[n - 1][rows[n - 1]], minlength=sizes[n - 2])
         below[n - 2] += counted.astype(np.int64)
     return below
-
-
-def first_positions(text: StoredText, trie: Trie, renumbered: Ints) -> list[Ints]:
-    """Per order, where each n-gram first starts in a text: int64 (m_n,), the number of its words if nowhere.
-
-    `renumbered`: the number in `trie` of each word number of the text.
-    """
-    found = [np.full(len(keys), text.tokens) for keys in trie.keys]
-    before = 0
-    for block, its in occurrences(text, trie, renumbered):
-        for first, (position, row) in zip(found, its, strict=True):
-            new = first[row] == text.tokens
-            # Of several values for one row the last is kept: reversed, the earliest.
-            first[row[new][::-1]] = before + position[new][::-1]
-        before += len(block.ids)
-    return found

@@ -24,6 +24,12 @@ def parse_count(text: str, fractional: bool, *, most: int = 2**63 - 1) -> float 
     return bounded_int(match[1], most=most) if match else None
 
 
+def split_count(line: str, fractional: bool, *, most: int = 2**63 - 1) -> tuple[list[str], float | None]:
+    """The words of an n-gram and the count behind them; None for the count of a malformed line."""
+    *ngram, text = tokens(line)
+    return ngram, parse_count(text, fractional, most=most) if 0 < len(ngram) < MOST_TOKENS else None
+
+
 @dataclass
 class Table:
     """N-grams as SRILM's word numbers, with their counts, in the order of the file."""
@@ -70,8 +76,7 @@ class Table:
 
     def count(self, order: int, words: WordList, *, fractional: bool) -> NgramCounts:
         """The sums over the sorted vocabulary."""
-        vocabulary, renumbered = words.sorted()
-        sorted_number = np.array(renumbered, np.int64)
+        vocabulary, sorted_number = words.sorted()
         dtype = np.float64 if fractional else np.int64
         groups, values = [], []
         for n in range(1, order + 1):
@@ -88,12 +93,11 @@ def count_lines(
     """The n-grams of a counts file and their counts, at most `most`; a malformed line is reported and ends the file."""
     lines = streams.lines(name)
     for line in lines:
-        found = tokens(line)
-        count = parse_count(found[-1], fractional, most=most) if 2 <= len(found) <= MOST_TOKENS else None
+        ngram, count = split_count(line, fractional, most=most)
         if count is None:
             streams.say(f"{lines.position}{MALFORMED}")
             return
-        yield found[:-1], count
+        yield ngram, count
 
 
 def read_counts(

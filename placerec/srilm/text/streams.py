@@ -58,11 +58,6 @@ class Streams:
                 return open(path, "rb")
             return _unpacking(path, suffix)
 
-    def read(self, name: str) -> bytes:
-        """All bytes of a file, as `open` gives it."""
-        with _named(name), self.closing(self.open(name)) as file:
-            return file.read()
-
     @contextmanager
     def closing(self, file: BinaryIO) -> Iterator[BinaryIO]:
         """Closes a file that `open` gave, unless it is standard input."""

@@ -7,6 +7,7 @@ from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.srilm.text.streams import Streams, tokens
 
 if TYPE_CHECKING:
+    from placerec.arrays import Ints
     from placerec.lm.vocabulary import Vocabulary
 
 PAUSE = "-pau-"
@@ -84,12 +85,12 @@ class WordList:
         count = Counter(self.index.values())
         return [count[self.index[word]] for word in vocabulary.words]
 
-    def sorted(self) -> "tuple[Vocabulary, list[int]]":
-        """The vocabulary of the language-model room, and the number there of each number here (-1: lost)."""
+    def sorted(self) -> "tuple[Vocabulary, Ints]":
+        """The words in code-point order, and the number there of each number here, int64 (N,), -1 where it is lost."""
         from placerec.lm.vocabulary import Vocabulary
 
         vocabulary = Vocabulary.of(word for word in self.words if word is not None)
-        return vocabulary, [-1 if word is None else vocabulary.index[word] for word in self.words]
+        return vocabulary, vocabulary.ids([word or "" for word in self.words])
 
 
 _LOWER = str.maketrans("ABCDEFGHIJKLMNOPQRSTUVWXYZ", "abcdefghijklmnopqrstuvwxyz")

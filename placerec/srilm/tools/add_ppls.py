@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Sequence
 
-from placerec.lm.logs import LN10
 from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 
@@ -55,5 +54,5 @@ def _whole(value: float) -> str:
 def _perplexity(log10_p: float, tokens: float) -> str:
     if tokens <= 0:
         return "undefined"
-    exponent = -log10_p / tokens * LN10
+    exponent = -log10_p / tokens * math.log(10)
     return f"{math.exp(exponent):g}" if exponent < 709 else "inf"

@@ -10,8 +10,7 @@ from placerec.lm.perplexity import Ranks, Totals
 from placerec.lm.score import TokenSequence
 from placerec.lm.vocabulary import SENTENCE_END
 from placerec.srilm.model.scorers import ModelView, Scorer
-from placerec.srilm.text.counts_file import MALFORMED, MOST_TOKENS, parse_count
-from placerec.srilm.text.streams import tokens
+from placerec.srilm.text.counts_file import MALFORMED, split_count
 from placerec.srilm.tools.reports import RANKS, TOKENS, Printer, block
 
 Table = dict[tuple[int, ...], float]
@@ -47,12 +46,11 @@ def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting
                 table, grouped = {}, True
             printer.streams.print(line + "\n")
             continue
-        found = tokens(line)
-        count = parse_count(found[-1], counting.fractional) if 2 <= len(found) <= MOST_TOKENS else None
+        words, count = split_count(line, counting.fractional)
         if count is None:
             printer.streams.say(f"{lines.position}{MALFORMED}")
-        elif len(found) - 1 <= counting.order:
-            ngram = tuple(printer.words.known(word) for word in found[:-1])
+        elif len(words) <= counting.order:
+            ngram = tuple(map(printer.words.known, words))
             table[ngram] = table.get(ngram, 0) + count
     _add(total, _group(table, scorer, printer, counting, shown=grouped or printer.debug >= 1))
     ranks = total.ranks if printer.debug >= RANKS else None

@@ -12,8 +12,7 @@ from placerec.lm.estimation import estimate_mutable
 from placerec.lm.mutable import insert_prefixes
 from placerec.lm.prune import prune
 from placerec.lm.stored_text import StoredText
-from placerec.srilm.order.estimation_messages import EstimationMessages
-from placerec.srilm.order.first_seen import FirstSeen
+from placerec.srilm.order.counts import EstimationMessages, FirstSeen
 from placerec.srilm.text.counts_file import Table, parse_count, read_counts
 from placerec.srilm.text.sentences import Handling, mark, read_sentences
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
@@ -149,9 +148,8 @@ def _read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[Ngram
         text = _read_text(options, words, streams)
     parts = [table.count(max(1, order), words, fractional=fractional) for table in tables]
     if text is not None and order > 0:
-        vocabulary, renumbered = words.sorted()
-        numbers = np.array(renumbered, np.int64)
-        parts.append(count_text(text, order, vocabulary, renumbered=numbers, fractional=fractional))
+        vocabulary, sorted_number = words.sorted()
+        parts.append(count_text(text, order, vocabulary, renumbered=sorted_number, fractional=fractional))
     if not parts:
         parts.append(Table().count(max(1, order), words, fractional=fractional))
     counts = parts[0] if len(parts) == 1 else add_counts(*parts)

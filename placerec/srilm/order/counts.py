@@ -1,20 +1,90 @@
-"""The order in which `ngram-count` comes by n-grams and contexts: that of its messages (section 15)."""
+"""The order in which `ngram-count` comes by n-grams and contexts: that of unsorted counts and messages (section 15)."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
-from placerec.lm.counts import NgramCounts
-from placerec.lm.trie import build_trie, runs
-from placerec.srilm.order.first_seen import FirstSeen
+from placerec.lm.counts import NgramCounts, occurrences
+from placerec.lm.stored_text import StoredText
+from placerec.lm.trie import Trie, build_trie, runs
+from placerec.lm.vocabulary import Vocabulary
 from placerec.srilm.order.hashing import walk_order
 from placerec.srilm.order.messages import Messages
+from placerec.srilm.text.counts_file import Table
+from placerec.srilm.text.vocabulary import WordList
 
 _NEVER = np.iinfo(np.int64).max
 _LONG = 1 << 40
 _NO_ROWS = np.zeros(0, np.int64)
+
+
+@dataclass(frozen=True)
+class FirstSeen:
+    """Where all n-grams came from: counts files in the order of reading, then the text."""
+
+    tables: Sequence[Table]
+    text: StoredText | None
+    words: WordList
+
+    def positions(self, trie: Trie) -> list[Ints]:
+        """Per order, when each row was first seen, int64 (m_n,)."""
+        _, sorted_number = self.words.sorted()
+        never = np.iinfo(np.int64).max
+        first = [np.full(len(keys), never) for keys in trie.keys]
+        now = 0
+        for table in self.tables:
+            for ngram in table.ngrams:
+                row = np.zeros(1, np.int64)
+                for n, number in enumerate(ngram, start=1):
+                    row = trie.find(n, row, sorted_number[[number]])
+                    first[n - 1][row] = np.minimum(first[n - 1][row], now)
+                now += 1
+        if self.text is not None:
+            for n, its in enumerate(first_positions(self.text, trie, sorted_number)):
+                first[n] = np.minimum(first[n], np.where(its < never - now, its + now, never))
+        return first
+
+    def numbers(self, vocabulary: Vocabulary) -> Ints:
+        """SRILM's number of each word of the sorted vocabulary, int64 (V,)."""
+        _, sorted_number = self.words.sorted()
+        numbers = np.full(len(vocabulary), -1, np.int64)
+        numbers[sorted_number[sorted_number >= 0]] = np.flatnonzero(sorted_number >= 0)
+        return numbers
+
+    def walk(self, counts: NgramCounts) -> tuple[Ints, Ints]:
+        """The n-grams in SRILM's unsorted order: orders and rows, int64 (M,)."""
+        trie = counts.trie
+        return walk_order(trie, counts.seen, self.positions(trie), self.numbers(trie.vocabulary))
+
+    def format(self, counts: NgramCounts, *, only: int | None = None, count: str = "%d") -> str:
+        """A counts file in SRILM's unsorted order."""
+        orders, rows = self.walk(counts)
+        texts = {n: counts.trie.texts(n) for n in range(1, counts.order + 1) if only in (None, n)}
+        lines = []
+        for n, row in zip(orders.tolist(), rows.tolist(), strict=True):
+            if n in texts:
+                lines.append(f"{texts[n][row]}\t{count % counts.counts[n - 1][row]}\n")
+        return "".join(lines)
+
+
+def first_positions(text: StoredText, trie: Trie, renumbered: Ints) -> list[Ints]:
+    """Per order, where each n-gram first starts in a text: int64 (m_n,), the number of its words if nowhere.
+
+    `renumbered`: the number in `trie` of each word number of the text.
+    """
+    found = [np.full(len(keys), text.tokens) for keys in trie.keys]
+    before = 0
+    for block, its in occurrences(text, trie, renumbered):
+        for first, (position, row) in zip(found, its, strict=True):
+            new = first[row] == text.tokens
+            # Of several values for one row the last is kept: reversed, the earliest.
+            first[row[new][::-1]] = before + position[new][::-1]
+        before += len(block.ids)
+    return found
 
 
 class EstimationMessages(Messages):
