@@ -1,15 +1,14 @@
 """Bags of words: by hand, against the definitions, and against the filter that they become."""
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
-import pytest
 from helpers.training_sets import followed, training_set_of, training_sets
 from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.arrays import Floats
-from placerec.errors import ModelError
 from placerec.hohmm import filter_stream, fixed_transition
 from placerec.hohmm.filter import normalised
 from placerec.methods import TrainingSet, guillaume2011
@@ -24,33 +23,11 @@ def drawn(training: TrainingSet, words: list[int]) -> list[int]:
     return [word % len(training.vocabulary) for word in words]
 
 
-@given(training=training_sets(), words=word_numbers, window=st.integers(1, 6))
-def test_a_window(training: TrainingSet, words: list[int], window: int) -> None:
-    words = drawn(training, words)
-    log_p, prior = log_word_p(training), np.log(training.prior)
-    bags = [words[max(0, t - window + 1) : t + 1] for t in range(len(words))]
-    expected = [normalised(prior + log_p[:, bag].sum(axis=1)) for bag in bags]
-    found = followed(guillaume2011.fit(training, window=window, detector="none"), words)
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-300)
-
-
-@given(training=training_sets(), words=word_numbers, forgetting=st.floats(0, 1))
-def test_forgetting(training: TrainingSet, words: list[int], forgetting: float) -> None:
-    words = drawn(training, words)
-    log_p = log_word_p(training)
-    expected = []
-    for t in range(len(words)):
-        scores = sum(forgetting ** (t - i) * log_p[:, words[i]] for i in range(t + 1))
-        expected.append(normalised(np.log(training.prior) + scores))
-    found = followed(guillaume2011.fit(training, forgetting=forgetting, detector="none"), words)
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-300)
-
-
 @given(training=training_sets(), words=word_numbers)
-def test_without_forgetting_it_is_the_filter_that_never_leaves(training: TrainingSet, words: list[int]) -> None:
+def test_a_bag_that_never_changes_is_the_filter_that_never_leaves(training: TrainingSet, words: list[int]) -> None:
     words = drawn(training, words)
     even = replace(training, prior=np.full(len(training.places), 1 / len(training.places)))
-    found = followed(guillaume2011.fit(even, detector="none"), words)
+    found = followed(guillaume2011.fit(even, threshold=inf), words)
     log10_p = log_word_p(training).T[words] / np.log(10)
     expected = filter_stream(log10_p, fixed_transition(len(training.places), 1.0)).belief
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
@@ -91,33 +68,12 @@ def test_cusum(seed: int, threshold: float) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-12)
 
 
-@pytest.mark.parametrize("detector", ["cusum", "recent"])
-def test_a_change_is_noticed_after_two_words_and_the_bag_is_what_came_since(detector: str) -> None:
+def test_a_change_is_noticed_after_two_words_and_the_bag_is_what_came_since() -> None:
     # A word is worth ln 10 = 2.3 nats; 4.6 are needed.
-    words = [0] * 50 + [1] * 3
-    best = followed(guillaume2011.fit(TWO, detector=detector, recent=2), words).argmax(axis=1)
-    assert best.tolist() == [0] * 51 + [1] * 2
-    belief = followed(guillaume2011.fit(TWO, detector=detector, recent=2), words)
+    belief = followed(guillaume2011.fit(TWO), [0] * 50 + [1] * 3)
+    assert belief.argmax(axis=1).tolist() == [0] * 51 + [1] * 2
     np.testing.assert_allclose(belief[51], [1 / 101, 100 / 101], rtol=1e-12)
 
 
 def test_without_a_detector_the_past_weighs_for_ever() -> None:
-    words = [0] * 50 + [1] * 40
-    assert not followed(guillaume2011.fit(TWO, detector="none"), words).argmax(axis=1).any()
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"detector": "guess"},
-        {"forgetting": 1.1},
-        {"forgetting": -0.1},
-        {"window": 0, "detector": "none"},
-        {"recent": 0},
-        {"window": 3},
-        {"window": 3, "detector": "none", "forgetting": 0.5},
-    ],
-)
-def test_misuse(options: dict[str, object]) -> None:
-    with pytest.raises(ModelError, match="bag"):
-        guillaume2011.fit(TWO, **options)  # type: ignore[arg-type]
+    assert not followed(guillaume2011.fit(TWO, threshold=inf), [0] * 50 + [1] * 40).argmax(axis=1).any()
