@@ -94,6 +94,7 @@ def test_reader_is_as_strict_as_kenlm(shared: Path) -> None:
         ("ngram 2=1", "ngram 2=2", ":12: '' found, a number, 2 words and perhaps a tab and a weight expected"),
         ("ngram 1=3", "ngram 1=2", ":8: the header promises 2 1-grams, and there are more"),
         ("ngram 1=3", "ngram 2=3", ":2: 'ngram 2=3' found, 'ngram 1=COUNT' expected"),
+        ("\\end\\", "\\3-grams:", ":13: '\\\\3-grams:' found, \\end\\ expected"),
         ("a b", "a z", ":11: the word 'z' is not among the 1-grams"),
         ("a b\n", "a b\t-0.1\n", ":11: backoff weight -0.1 on the highest order, which has none"),
         ("\\end\\\n", "", ":12: the file ends where \\end\\ is expected; is it truncated?"),

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from unittest.mock import patch
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from placerec import reference
 from placerec.lm import NgramCounts, count_ngrams, format_counts
-from placerec.lm.counts import count_text
+from placerec.lm.counts import count_text, recomputed, tabulate
 from placerec.lm.stored_text import StoredText
 from placerec.lm.vocabulary import Vocabulary
 
@@ -67,6 +68,23 @@ def test_counts_file_puts_extensions_behind_their_prefix() -> None:
     counts = count_ngrams([["a-b", "a"], ["a", "b"]], 2, markers=False)
     # A word's extensions come before the next word, even where bytes would sort otherwise ("a b" > "a-b").
     assert format_counts(counts) == "a\t2\na b\t1\na-b\t1\na-b a\t1\nb\t1\n"
+
+
+def test_recomputed_counts_are_the_sums_of_their_extensions() -> None:
+    counts = count_ngrams([["a", "b", "a", "b"], ["b"]], 3, markers=False)
+    # Trigrams "a b a" and "b a b"; what nothing extends keeps its count.
+    assert as_counter(recomputed(counts)) == Counter(
+        {("a",): 1, ("b",): 1, ("a", "b"): 1, ("b", "a"): 1, ("a", "b", "a"): 1, ("b", "a", "b"): 1}
+    )
+
+
+def test_recomputed_counts_leave_out_what_is_not_counted() -> None:
+    counts = tabulate(Vocabulary.of(["a", "b"]), 2, [np.array([[0, 1]])], [np.array([5])])
+    hidden = replace(
+        counts, seen=(np.array([True, True]), np.zeros(1, bool)), counts=(np.array([2, 3]), counts.counts[1])
+    )
+    assert recomputed(hidden).counts[0].tolist() == [2, 3]
+    assert recomputed(replace(hidden, seen=(hidden.seen[0], np.ones(1, bool)))).counts[0].tolist() == [5, 3]
 
 
 def test_nothing_to_count() -> None:

@@ -14,6 +14,11 @@ from placerec import reference
 from placerec.errors import LanguageModelError
 from placerec.lm import SMOOTHINGS, BackoffModel, count_ngrams, estimate, format_arpa, smoothing
 from placerec.lm.check import context_sums
+from placerec.lm.counts import tabulate
+from placerec.lm.discounts import Rule, witten_bell
+from placerec.lm.estimation import estimate_mutable
+from placerec.lm.mutable import Trace
+from placerec.lm.vocabulary import Vocabulary
 
 VOCABULARY = ["a", "b", "c", "d", "e"]
 CLOSED_SMOOTHINGS = {
@@ -140,3 +145,37 @@ def test_counts_too_large_to_leave_anything_are_named() -> None:
     often = replace(counts, counts=tuple(10**17 * each for each in counts.counts))
     with pytest.raises(LanguageModelError, match=r"a context of the 1-grams was counted 3e\+17 times: so often that"):
         estimate(often, smoothing("lidstone-backoff", 1.0))
+
+
+def test_longer_ngrams_that_never_occur_are_not_listed() -> None:
+    vocabulary = Vocabulary.of(["</s>", "<s>", "<unk>", "a", "b"])
+    ngrams = [np.array([[3], [4]]), np.array([[3, 4], [3, 3], [4, 3]])]
+    counts = tabulate(vocabulary, 2, ngrams, [np.array([3, 1]), np.array([0, 2, 1])])
+    model = estimate(counts, smoothing("witten-bell"), non_events=["</s>"])
+    assert model.trie.texts(2) == ["a a", "b a"]
+
+
+class Discarded(Trace):
+    """Keeps the orders of which n-grams are left out."""
+
+    def __init__(self) -> None:
+        self.orders: list[tuple[int, int]] = []
+
+    def discarded_ngrams(self, n: int, non_events: int, discounted: int) -> None:
+        self.orders += [(n, non_events)] * (non_events > 0)
+
+
+def test_ngrams_that_end_in_what_is_not_predicted_are_told_of_from_order_2() -> None:
+    counts = count_ngrams([["a", "b", "x", "b", "a"]], 2)
+    trace = Discarded()
+    estimate_mutable(counts, [Rule(witten_bell, True)] * 2, non_events=["x"], trace=trace)
+    assert trace.orders == [(2, 1)]
+
+
+def test_contexts_that_leave_nothing_to_unseen_words_back_off_with_nothing() -> None:
+    """By relative frequency "a b" is certain, and nothing is left for the words that were never seen behind a."""
+    counts = count_ngrams([["a", "b"], ["a", "b", "c"]], 2, markers=False)
+    model = estimate_mutable(counts, [Rule(), Rule()], non_events=["</s>"])
+    row = model.trie.vocabulary.index["a"]
+    assert model.is_context[0][row]
+    assert model.backoff[0][row] == -np.inf

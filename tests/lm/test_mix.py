@@ -13,11 +13,12 @@ from placerec.lm.check import context_sums
 from placerec.lm.mix import Cache, loglinear, merge, merge_weight, mixed, posteriors, with_cache
 from placerec.lm.mutable import mutable_models
 
-texts = st.lists(st.lists(st.sampled_from("abcd"), min_size=1, max_size=8), min_size=1, max_size=6)
+WORDS = list("abcd")
+texts = st.lists(st.lists(st.sampled_from(WORDS), min_size=1, max_size=8), min_size=1, max_size=6)
 
 
 def trained(sentences: list[list[str]], order: int = 3) -> BackoffModel:
-    return estimate(count_ngrams(sentences, order, vocabulary=[*"abcd"]), smoothing("witten-bell"))
+    return estimate(count_ngrams(sentences, order, vocabulary=WORDS), smoothing("witten-bell"))
 
 
 def interpolated(models: Sequence[BackoffModel], weights: Sequence[float]) -> BackoffModel:
@@ -58,6 +59,17 @@ def test_a_component_without_weight_leaves_its_n_grams_behind() -> None:
     merged = interpolated([one, other], [1.0, 0.0])
     assert len(merged.trie.keys[2]) > len(one.trie.keys[2])
     assert merged.log10_p("d", ["c"]) == pytest.approx(one.log10_p("d", ["c"]), abs=1e-6)
+
+
+def test_a_mixture_lists_what_its_components_list_and_nothing_else() -> None:
+    counts = count_ngrams([list("abc"), list("abc"), list("bd")], 3, vocabulary=WORDS)
+    # Trigrams of which the endings are left out.
+    one = estimate(counts, smoothing("witten-bell"), min_count=(1, 3, 1))
+    merged = interpolated([one, trained([["d", "a"]], 2)], [0.5, 0.5])
+    for n in (2, 3):
+        other = trained([["d", "a"]], 2).trie.texts(n) if n == 2 else []
+        assert set(merged.trie.texts(n)) == {*one.trie.texts(n), *other}
+    assert not one.trie.closed
 
 
 def test_components_join_one_after_the_other() -> None:
