@@ -38,16 +38,25 @@ def whole_file(path: Path) -> Iterator[Path]:
             kind = "a folder" if target.is_dir() else "no regular file"
             raise OutputError(f"{path}: is {kind}, and a file is to be written; name another")
         target.parent.mkdir(parents=True, exist_ok=True)
-        # The suffix is kept: numpy and OpenCV choose their format by it.
-        handle, name = tempfile.mkstemp(prefix=PARTIAL.format(target.name), suffix=target.suffix, dir=target.parent)
-        os.close(handle)
+    with _writing(path), replaced_file(target) as partial, _writing(path, partial):
+        yield partial
+
+
+@contextmanager
+def replaced_file(target: Path) -> Iterator[Path]:
+    """Yield a temporary path beside the regular file `target`, which it becomes on success; on failure it is removed.
+
+    What the system refuses is an OSError.
+    """
+    # The suffix is kept: numpy and OpenCV choose their format by it.
+    handle, name = tempfile.mkstemp(prefix=PARTIAL.format(target.name), suffix=target.suffix, dir=target.parent)
+    os.close(handle)
     partial = Path(name)
     lock = _lock(partial)
     try:
-        with _writing(path, partial):
-            yield partial
-            partial.chmod(0o666 & ~_umask())
-            partial.replace(target)
+        yield partial
+        partial.chmod(0o666 & ~_umask())
+        partial.replace(target)
     finally:
         _unlock(lock)
         partial.unlink(missing_ok=True)

@@ -6,7 +6,7 @@ Text is handled as bytes kept in str (Latin-1), so that no byte is lost and word
 import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager
 from functools import wraps
 from typing import BinaryIO, TypeVar, cast
 
@@ -74,24 +74,21 @@ class Streams:
             self._once("output")
             yield self.stdout
             return
-        with _named(name), ExitStack() as stack:
+        with _named(name):
             path = os.path.realpath(_path(name))
             suffix = _packing(name)
-            folder, base = os.path.split(path)
             # A device or a pipe has to be written itself; so has a file in a folder that takes no other.
-            direct = os.path.exists(path) and not (os.path.isfile(path) and os.access(folder, os.W_OK))
-            partial = path if direct else os.path.join(folder, f".{base}.partial-{os.getpid()}")
-            file: BinaryIO = stack.enter_context(open(partial, "wb"))
-            if not direct:
-                stack.callback(_remove, partial)
-            if suffix:
-                with _packing_into(file, suffix) as packed:
-                    yield packed
-            else:
-                yield file
-            file.close()
-            if not direct:
-                os.replace(partial, path)
+            if os.path.exists(path) and not (os.path.isfile(path) and os.access(os.path.dirname(path), os.W_OK)):
+                with open(path, "wb") as file:
+                    yield from _packed_into(file, suffix)
+                return
+            # Here and below: not needed by those who only read.
+            from pathlib import Path
+
+            from placerec.files import replaced_file
+
+            with replaced_file(Path(path)) as partial, open(partial, "wb") as file:
+                yield from _packed_into(file, suffix)
 
     def write(self, name: str, text: str) -> None:
         """Write a file whole, as `output` does."""
@@ -191,11 +188,6 @@ def _path(name: str) -> str:
     return os.fsdecode(name.encode("latin-1"))
 
 
-def _remove(path: str) -> None:
-    with suppress(FileNotFoundError):
-        os.unlink(path)
-
-
 def _packing(name: str) -> str:
     """The suffix by which a file is packed, an empty text if it is not."""
     suffix = name[name.rfind(".") :] if "." in name[1:] else ""
@@ -225,9 +217,14 @@ def _unpacking(path: str, suffix: str) -> BinaryIO:
     return cast(BinaryIO, GzipFile(path, "rb") if suffix == ".gz" else BZ2File(path, "rb"))
 
 
-def _packing_into(file: BinaryIO, suffix: str) -> BinaryIO:
+def _packed_into(file: BinaryIO, suffix: str) -> Iterator[BinaryIO]:
+    """The file, or what packs bytes into it and is closed afterwards."""
+    if not suffix:
+        yield file
+        return
     from bz2 import BZ2File
     from gzip import GzipFile
 
     # Without name and time, so that the same text gives the same bytes.
-    return cast(BinaryIO, GzipFile("", "wb", 6, file, mtime=0) if suffix == ".gz" else BZ2File(file, "wb"))
+    with GzipFile("", "wb", 6, file, mtime=0) if suffix == ".gz" else BZ2File(file, "wb") as packed:
+        yield cast(BinaryIO, packed)
