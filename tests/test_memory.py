@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from placerec.frames import find_sequences
 from placerec.jobs import workers
-from placerec.lm import stored_text, windows
+from placerec.lm import stored_text
 from placerec.model import train_lm
 from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, chunks, describe_sources, train_dictionary
 from placerec.words import write_stream, write_vocabulary
@@ -100,7 +100,7 @@ def test_models_are_trained_in_bounded_memory(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(stored_text, "IN_MEMORY", 1 << 14)
     monkeypatch.setattr("placerec.lm.counts.BLOCK", 1 << 12)
     monkeypatch.setattr(stored_text, "BLOCK", 1 << 12)
-    monkeypatch.setattr(windows, "WAITING", 1 << 12)
+    monkeypatch.setattr(stored_text, "WAITING", 1 << 12)
     for count in (10, 60):
         for number in range(count):
             write_stream(run_through(f"run{number}", number, 600), tmp_path / str(count) / f"run{number}.tsv")

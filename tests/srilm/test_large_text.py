@@ -125,9 +125,9 @@ def test_a_full_disk_is_an_error_of_one_line() -> None:
 # Counts a text as bin/ngram-count does, with much less memory for it, and prints the most memory that was used.
 CHILD = """
 import re, sys
-from placerec.lm import stored_text, windows
+from placerec.lm import stored_text
 from placerec.srilm.tools.run import run
-stored_text.IN_MEMORY, windows.WAITING = 1 << 19, 1 << 16
+stored_text.IN_MEMORY, stored_text.WAITING = 1 << 19, 1 << 16
 status = run("ngram-count", sys.argv[1:])
 print(re.search(r"VmHWM:\\s*(\\d+) kB", open("/proc/self/status").read())[1])
 sys.exit(status)
