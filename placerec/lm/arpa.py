@@ -40,7 +40,7 @@ def format_arpa(model: BackoffModel, comment: str = "") -> str:
 
 
 def arpa_blocks(model: BackoffModel, comment: str = "", *, encoding: str = "utf-8") -> Iterator[bytes]:
-    """The same text in blocks of encoded lines, so that it need not be held whole."""
+    """The ARPA text of `model` in blocks of encoded lines, so that it need not be held whole."""
     weighted = [~np.isnan(backoff) for backoff in model.backoffs]
     return row_blocks(model.trie, model.log10_probs, model.backoffs, weighted, comment=comment, encoding=encoding)
 
@@ -73,8 +73,8 @@ def row_blocks(
         rows, before = _regrouped(trie.prefix(n), rank) if n > 1 else (word, np.zeros_like(word))
         word = word[rows]
         shown = slice(None) if stored is None else np.flatnonzero(stored[n - 1][rows])
-        its = rows[shown]
-        log10_p, backoff, has_weight = log10_probs[n - 1][its], backoffs[n - 1][its], weighted[n - 1][its]
+        row = rows[shown]
+        log10_p, backoff, has_weight = log10_probs[n - 1][row], backoffs[n - 1][row], weighted[n - 1][row]
         yield from lines.blocks(log10_p, backoff, has_weight, before[shown], word[shown])
         if n < trie.order:
             by_word = np.argsort(_narrow(word, len(words)), kind="stable")
@@ -272,7 +272,7 @@ class _Reader:
         return model, row * len(vocabulary) + numbers[:, -1]
 
     def with_contexts(self, model: BackoffModel, numbers: Ints, line: int) -> BackoffModel:
-        """`model` with n-grams (m, order) of its highest order added at the value that it gives them by back-off."""
+        """`model` with n-grams (m, N) of the highest order N added, each with the log10 p that back-off gives it."""
         prefix = _rows(model.trie, numbers[:, :-1])
         if (prefix < 0).any():
             raise self.error("the context of an n-gram is missing at two orders", line)

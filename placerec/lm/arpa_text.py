@@ -50,20 +50,20 @@ class PlainLines:
             yield b"".join(b"%b\t%b%b%b" % line for line in fields)
 
     def longer(self, before: Ints, word: Ints) -> "PlainLines":
-        """The next order's lines: its contexts (c,) are contexts of this order with a word added."""
+        """The lines of the next order, whose contexts (c,) are contexts of this one with a word added."""
         texts = zip(before.tolist(), word.tolist(), strict=True)
         return PlainLines(self.words, [b"%b%b " % (self.contexts[row], self.words[number]) for row, number in texts])
 
 
 @dataclass(frozen=True)
 class PackedLines:
-    """The same as rows of cells; `words` (V, k) and `contexts` (c, (n-1) k) have a blank before each word."""
+    """The lines of one order as rows of cells: `words` (V, k) and `contexts` (c, (n-1) k), a blank before each word."""
 
     words: Cells
     contexts: Cells
 
     def blocks(self, log10_p: Singles, backoff: Singles, weighted: Mask, before: Ints, word: Ints) -> Iterator[bytes]:
-        """The same lines as PlainLines gives."""
+        """Lines, each after a line end: log10 p (m,), weights (m,) where `weighted` (m,), contexts (m,), words (m,)."""
         split, some_weighted = 2 + self.contexts.shape[1], bool(weighted.any())
         end = split + self.words.shape[1]
         rows = np.empty((min(len(word), _BLOCK), end + 2 * some_weighted), _CELL)
@@ -81,7 +81,7 @@ class PackedLines:
             yield row.tobytes().translate(None, b"\0")
 
     def longer(self, before: Ints, word: Ints) -> "PackedLines":
-        """The same as of PlainLines."""
+        """The lines of the next order, whose contexts (c,) are contexts of this one with a word added."""
         return PackedLines(self.words, np.concatenate([self.contexts[before], self.words[word]], axis=1))
 
 

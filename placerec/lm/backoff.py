@@ -131,7 +131,7 @@ class ModelUnion:
         return self.tables.score(np.fromiter(map(self.index.__getitem__, words), np.int64, len(words)))
 
     def follow(self) -> Callable[[str], list[float]]:
-        """A function to be asked for each word of a text in turn: its C values of `score`; KeyError as there.
+        """A function to be asked for each word of a text in turn: the C log10 p that `score` gives it, or KeyError.
 
         Constant memory: it remembers where the last N-1 words stand.
         """

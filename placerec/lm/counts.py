@@ -110,7 +110,7 @@ def _listed(numbers: Mapping[str, int], word: str) -> int:
 def count_text(
     text: StoredText, order: int, vocabulary: Vocabulary, *, renumbered: Ints | None = None, fractional: bool = False
 ) -> NgramCounts:
-    """Count the n-grams of a text, each as often as its sentence weighs (once, if sentences have no weights).
+    """Count the n-grams of a text, each as often as the sentence around it weighs (once, if sentences have no weights).
 
     `renumbered`: the vocabulary's number of each word number of the text, if that has others. `fractional`: counts
     are float64; otherwise weights must be integers. Beside the text, memory holds a few times the n-grams.
@@ -130,8 +130,8 @@ def _real_sums(text: StoredText, trie: Trie, renumbered: Ints | None) -> tuple[F
     sums = [np.zeros(len(keys)) for keys in trie.keys]
     for block, found in occurrences(text, trie, renumbered):
         weights = np.repeat(cast(Floats, block.weights), block.lengths)
-        for its, (position, row) in zip(sums, found, strict=True):
-            np.add.at(its, row, weights[position])
+        for order_sums, (position, row) in zip(sums, found, strict=True):
+            np.add.at(order_sums, row, weights[position])
     return tuple(sums)
 
 
@@ -140,7 +140,7 @@ def occurrences(
 ) -> Iterator[tuple[Block, list[tuple[Ints, Ints]]]]:
     """Per block of a text and per order, where in the block n-grams start, ascending, and their rows: two int64 (m,).
 
-    `renumbered`: as in `count_text`. All n-grams of the text must be in `trie`.
+    `renumbered`: the trie's number of each word number of the text, if that has others. All n-grams of the text must be in `trie`.
     """
     indexes = [RowIndex(keys) for keys in trie.keys[1:]]
     for block in text:
@@ -201,8 +201,8 @@ def tabulate(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints], values:
     seen = [np.zeros(len(keys), bool) for keys in trie.keys]
     for group, value in zip(rows, values, strict=False):
         np.add.at(counts[len(group) - 1], group[-1], value)
-        for n, its in enumerate(group):
-            seen[n][its] = True
+        for n, row in enumerate(group):
+            seen[n][row] = True
     return NgramCounts(trie, tuple(counts), tuple(seen))
 
 

@@ -114,7 +114,7 @@ def counts_of_counts(counts: NgramCounts, n: int, top: int, predictable: Mask, m
     """How many n-grams of order n occur 0, 1, ..., `top` times, int64 (top+1,).
 
     `predictable` bool (V,): words whose n-grams count when they come last. `meta` int64 (V,): k > 0 for a word that
-    stands for "n-grams that occur k times", as often as its count says.
+    stands for "n-grams that occur k times", as often as the count of that word says.
     """
     trie = counts.trie
     word, count, seen = trie.word(n), counts.counts[n - 1], counts.seen[n - 1]

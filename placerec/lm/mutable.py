@@ -71,7 +71,7 @@ class Trace:
     ) -> None:
         """What taking out each of the n-grams `rows` (m,) of order n would do, and whether it is `gone`.
 
-        `context`: log10 of the joint probability of its context; `old`, `new`: its log10 p with and without it;
+        `context`: log10 of the joint probability of the context; `old`, `new`: log10 p with the n-gram and without;
         `entropy`: how far the model moves (relative entropy, base 10).
         """
 
@@ -146,7 +146,7 @@ class MutableModel:
                 rows = np.flatnonzero(shorter)
 
     def tables(self, numbers: Ints, size: int) -> ScoreTables:
-        """The tables that give words their probability: words are `numbers` (V,) there, below `size`."""
+        """The tables that give words a probability; there the word numbers are `numbers` int64 (V,), below `size`."""
         orders = [
             [Ngrams(numbers[self.trie.matrix(n)], log10_p, backoff, is_context, stored)]
             for n, (log10_p, backoff, is_context, stored) in enumerate(
@@ -168,36 +168,12 @@ class MutableModel:
         )
 
 
-def mutable_models(
-    models: Sequence[BackoffModel], non_events: Sequence[str], words: Sequence[str] = ()
-) -> list[MutableModel]:
-    """Mutable forms of models over one trie, that of all their n-grams; `words` are added to the vocabulary."""
-    vocabulary = Vocabulary.of([word for model in models for word in model.words] + list(words))
-    return unite([_mutable_model(model) for model in models], vocabulary, ~vocabulary.mask(non_events))
-
-
-def _mutable_model(model: BackoffModel) -> MutableModel:
-    trie = model.trie.with_endings()
-    mutable = MutableModel(trie, np.ones(len(trie.vocabulary), bool))
-    rows = np.arange(len(trie.vocabulary))
-    for n in range(1, model.order + 1):
-        rows = trie.find(n, rows[model.trie.prefix(n)], model.trie.word(n)) if n > 1 else rows
-        mutable.stored[n - 1][rows] = True
-        mutable.log10_p[n - 1][rows] = model.log10_probs[n - 1]
-        backoff = model.backoffs[n - 1]
-        is_context = ~np.isnan(backoff)
-        mutable.backoff[n - 1][rows[is_context]] = backoff[is_context]
-        mutable.add_contexts(n, rows[is_context])
-    mutable.refresh_all()
-    return mutable
-
-
 def unite(
     models: Sequence[MutableModel], vocabulary: Vocabulary, predictable: Mask, alias_counts: Ints | None = None
 ) -> list[MutableModel]:
-    """The same models over one trie, that of all their rows and of `vocabulary`, which must list all their words.
+    """Models over one trie: that of the rows of all of them, and of `vocabulary`, which must list all their words.
 
-    `predictable` and `alias_counts` (V,) as in MutableModel.
+    `predictable` bool (V,), `alias_counts` int64 (V,): fields of MutableModel.
     """
     order = max(model.order for model in models)
     groups = []
@@ -318,7 +294,7 @@ def spread_unigram_mass(model: MutableModel, mass: float, trace: Trace) -> None:
 
 
 def insert_prefixes(model: MutableModel, trace: Trace) -> None:
-    """Section 6.7: a context needs a line for its weight; those that have none get their backed-off value."""
+    """Section 6.7: a context needs a line for the weight; those without one get one, with log10 p by back-off."""
     trie = model.trie
     missing: list[Ints] = [np.zeros(0, np.int64)] * trie.order
     needed = np.zeros(0, np.int64)

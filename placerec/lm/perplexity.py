@@ -28,7 +28,7 @@ class Totals(NamedTuple):
         return Totals(*(a + b for a, b in zip(self, other, strict=True)))
 
     def times(self, weight: float) -> "Totals":
-        """The same text, counted `weight` times."""
+        """The totals of the text when it is counted `weight` times."""
         return Totals(*(weight * value for value in self))
 
     @property

@@ -75,7 +75,7 @@ def _try(
 
 
 def joint_log10_p(model: MutableModel, n: int, *, start: int, end: int) -> Singles:
-    """log10 of the joint probability of the words of every row of order n, float32 (m_n,); as `score.joint_log10_p`.
+    """log10 of the joint probability of the words of every row of order n, float32 (m_n,).
 
     `start` and `end` are the word numbers of <s> and </s>, -1 if not listed; the backed-off values must be fresh.
     """

@@ -49,7 +49,7 @@ class TokenSequence(NamedTuple):
 
     @property
     def place(self) -> Ints:
-        """How many words of its sequence stand before each word, int64 (T,)."""
+        """How many words of the sequence stand before each word, int64 (T,)."""
         position = np.arange(len(self.ids))
         return position - np.maximum.accumulate(np.where(self.first, position, 0))
 
@@ -212,9 +212,10 @@ class ScoreTables:
             return log10_p if sums is log10_p else log10_p + sums
 
     def follow(self, index: Mapping[str, int]) -> Callable[[str], list[float]]:
-        """A function to be asked for each word of a text in turn: its row of `score`; `index` has the words' numbers.
+        """A function to be asked for each word of a text in turn: log10 p under each of C models, as `score` gives it.
 
-        Constant memory: it remembers where the last N-1 words stand. For tables that list every ending of an n-gram.
+        `index`: the numbers of words. Constant memory: the function remembers where the last N-1 words stand. The
+        tables must be of C models and list every ending of an n-gram.
         """
         base, unigrams, log10_p = self.V + 1, self._unigrams.tolist(), self.log10_p
         longer = [(table.rows.finder(), table.start, table.renumbered) for table in self.tables[1:]]
@@ -283,7 +284,7 @@ def build_tables(V: int, orders: Sequence[Sequence[Ngrams]]) -> ScoreTables:
 
 
 def build_regular_tables(V: int, orders: Sequence[Sequence[Ngrams]]) -> ScoreTables | None:
-    """The tables, as of `build_tables`; None where an n-gram is listed twice, or its context has no weight."""
+    """The tables of orders 1..N over words 0..V-1; None if an n-gram is listed twice or the context has no weight."""
     for tables, stems in _built(V, orders):
         if not tables.tables[-1].rows.distinct or not _have_contexts(tables, stems):
             return None
@@ -375,7 +376,7 @@ def draw_word(p: Floats, rng: "np.random.Generator") -> int:
 
 
 def generate(
-    spread: Callable[[Sequence[int]], Singles],
+    distribution: Callable[[Sequence[int]], Singles],
     prefix: Sequence[int],
     end: int,
     rng: "np.random.Generator",
@@ -385,13 +386,13 @@ def generate(
 ) -> list[int]:
     """Word numbers drawn one after the other behind `prefix` until `end` is drawn (it is left out).
 
-    `spread` gives log10 p float32 (V,) of every word after a history of up to `order`-1 words; what cannot be drawn
-    has -inf. The sentence ends as well where nothing can be drawn, and after `longest` words.
+    `distribution` gives log10 p float32 (V,) of every word after a history of up to `order`-1 words, -inf for what
+    cannot be drawn. The sentence ends as well where nothing can be drawn, and after `longest` words.
     """
     words: list[int] = []
     history = list(prefix)
     while len(words) < longest:
-        p = p_of(spread(history[max(0, len(history) - order + 1) :]))
+        p = p_of(distribution(history[max(0, len(history) - order + 1) :]))
         if not p.sum() > 0:
             break
         word = draw_word(p, rng)

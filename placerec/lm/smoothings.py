@@ -125,7 +125,7 @@ _FITS: dict[str, Callable[[float], Fit]] = {
 }
 SMOOTHINGS = tuple(_FITS)
 
-# The options of ngram-count that do the same; None: it cannot.
+# The options of ngram-count for each smoothing; None: it has none.
 SRILM_OPTIONS: dict[str, str | None] = {
     "witten-bell": "-wbdiscount -interpolate",
     "witten-bell-backoff": "-wbdiscount",

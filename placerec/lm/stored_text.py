@@ -149,7 +149,7 @@ def distinct_windows(
     """The distinct windows, ascending: a column int64 (m,) of packed words per span, and their counts int64 (m,).
 
     `spans`: the words of a window that share a number, `bits` bits each. `renumbered`: the number to use for each
-    word number of the text. `weighted`: whether a window counts as much as its sentence weighs (an integer), or once.
+    word number of the text. `weighted`: whether a window counts as much as the sentence weighs (an integer), or once.
     """
     runs: list[Run] = []
     reduced = partial(_reduced, spans=spans, bits=bits, renumbered=renumbered, weighted=weighted)

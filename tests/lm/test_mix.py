@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from helpers.mutable_models import mutable_models
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,7 +12,6 @@ from placerec.arrays import Singles
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
 from placerec.lm.check import context_sums
 from placerec.lm.mix import Cache, loglinear, merge, merge_weight, mixed, posteriors, with_cache
-from placerec.lm.mutable import mutable_models
 
 WORDS = list("abcd")
 texts = st.lists(st.lists(st.sampled_from(WORDS), min_size=1, max_size=8), min_size=1, max_size=6)

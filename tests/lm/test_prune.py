@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.mutable_models import mutable_models
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.arrays import Ints
 from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
 from placerec.lm.check import context_sums
-from placerec.lm.mutable import SILENT, Trace, mutable_models, reweigh
+from placerec.lm.mutable import SILENT, Trace, reweigh
 from placerec.lm.prune import joint_log10_p, prune, prune_improbable
 
 SILENT_WORDS = ["<s>", "<unk>"]

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from helpers.mutable_models import mutable_models
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.arrays import Ints
 from placerec.lm import BackoffModel, count_ngrams, estimate, score, smoothing, with_unigrams
 from placerec.lm.backoff import unite_models
-from placerec.lm.mutable import MutableModel, mutable_models
+from placerec.lm.mutable import MutableModel
 from placerec.lm.score import (
     Contexts,
     Ngrams,
