@@ -140,7 +140,8 @@ def occurrences(
 ) -> Iterator[tuple[Block, list[tuple[Ints, Ints]]]]:
     """Per block of a text and per order, where in the block n-grams start, ascending, and their rows: two int64 (m,).
 
-    `renumbered`: the trie's number of each word number of the text, if that has others. All n-grams of the text must be in `trie`.
+    `renumbered`: the trie's number of each word number of the text, if that has others. `trie` must list all n-grams of
+    the text.
     """
     indexes = [RowIndex(keys) for keys in trie.keys[1:]]
     for block in text:
