@@ -15,7 +15,7 @@ from placerec.lm.mutable import MutableModel
 from placerec.srilm.model import arpa_reader
 from placerec.srilm.model.arpa import read_model
 from placerec.srilm.model.arpa_reader import log_value
-from placerec.srilm.order.contexts import ContextTimes, message_order
+from placerec.srilm.order.messages import ContextTimes, message_order
 from placerec.srilm.text.streams import SrilmError, Streams
 from placerec.srilm.text.vocabulary import WordList
 from placerec.srilm.tools.ngram import ngram

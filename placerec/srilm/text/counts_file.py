@@ -3,13 +3,14 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from placerec.lm.counts import NgramCounts, tabulate
 from placerec.srilm.text.numbers import bounded_int, leading_float
 from placerec.srilm.text.streams import Streams, tokens
-from placerec.srilm.text.vocabulary import WordList
+
+if TYPE_CHECKING:
+    from placerec.lm.counts import NgramCounts
+    from placerec.srilm.text.vocabulary import WordList
 
 MOST_TOKENS = 100
 MALFORMED = "malformed N-gram count or more than 100 words per line"
@@ -52,7 +53,7 @@ class Table:
         kept = [i for i, ngram in enumerate(self.ngrams) if tuple(ngram) in held]
         return Table([self.ngrams[i] for i in kept], [self.counts[i] for i in kept])
 
-    def at_least(self, minima: Sequence[float], words: WordList) -> "Table":
+    def at_least(self, minima: Sequence[float], words: "WordList") -> "Table":
         """The n-grams seen as often as the minimum of their order; the others become counts of counts per prefix.
 
         That is what -read-with-mincounts does, with a meta tag; without one they are left out.
@@ -74,8 +75,13 @@ class Table:
                         table.add([*prefix, words.add(f"{words.meta_tag}{count}")], times)
         return table
 
-    def count(self, order: int, words: WordList, *, fractional: bool) -> NgramCounts:
+    def count(self, order: int, words: "WordList", *, fractional: bool) -> "NgramCounts":
         """The sums over the sorted vocabulary."""
+        # Not needed by ngram-merge, which starts much sooner without.
+        import numpy as np
+
+        from placerec.lm.counts import tabulate
+
         vocabulary, sorted_number = words.sorted()
         dtype = np.float64 if fractional else np.int64
         groups, values = [], []
@@ -101,7 +107,7 @@ def count_lines(
 
 
 def read_counts(
-    name: str, order: int, words: WordList, streams: Streams, *, fractional: bool, limited: bool = False
+    name: str, order: int, words: "WordList", streams: Streams, *, fractional: bool, limited: bool = False
 ) -> Table:
     """The n-grams up to `order` of a counts file; with `limited`, those with a word that is not listed are left out."""
     table = Table()

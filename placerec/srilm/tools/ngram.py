@@ -14,7 +14,7 @@ from placerec.srilm.text.sentences import Handling
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.text.vocabulary import PAUSE, WordList, format_words, read_aliases, read_words
 from placerec.srilm.tools.options import Option, Options, Parsed, parse
-from placerec.srilm.tools.reports import TOKENS, Printer, print_perplexity
+from placerec.srilm.tools.reports import TOKENS, Counting, Printer, print_counts, print_perplexity
 
 if TYPE_CHECKING:
     from placerec.srilm.tools.ngram_models import Models
@@ -234,8 +234,6 @@ class _Run:
 
     def print_counts(self, scorer: Scorer, printer: Printer) -> None:
         """`-counts`."""
-        from placerec.srilm.tools.count_report import Counting, print_counts
-
         options = self.options
         order = options["count-order"] or self.order
         counting = Counting(order, options["float-counts"], options["counts-entropy"], options["escape"])

@@ -13,8 +13,7 @@ from placerec.lm.score import TokenSequence
 from placerec.srilm.model.arpa import read_model, tables_of
 from placerec.srilm.model.mixed_scorers import Cached, Lenient, LogLinear, Mixture
 from placerec.srilm.model.scorers import Model, Null, Scorer
-from placerec.srilm.order.contexts import ContextTimes, message_order
-from placerec.srilm.order.messages import Messages
+from placerec.srilm.order.messages import ContextTimes, Messages, message_order
 from placerec.srilm.text.streams import Streams
 from placerec.srilm.text.vocabulary import WordList
 from placerec.srilm.tools.options import Parsed
