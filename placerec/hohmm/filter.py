@@ -66,32 +66,40 @@ def filter_stream(log10_likelihoods: Floats, transition: Transition, elapsed: Fl
     if not len(log10_likelihoods):
         return Filtered(np.empty(log10_likelihoods.shape), np.empty(0, bool))
     steps = transition_steps(transition, (np.ones(len(log10_likelihoods)) if elapsed is None else elapsed)[1:])
-    if steps.mixes:
-        return _scan(log10_likelihoods, steps)
-    logs, possible = _word_by_word(log10_likelihoods, steps)
-    belief = np.exp(logs)
-    return Filtered(belief / belief.sum(axis=1, keepdims=True), possible)
+    # Which words are scanned depends on none that come later: these never change the last digit of a belief.
+    scanned = _scan(log10_likelihoods[: steps.mixing + 1], steps)
+    if steps.mixing == steps.count:
+        return scanned
+    # Before a prediction that does not mix, what underflows counts: the last word is taken again in logarithms.
+    with np.errstate(divide="ignore"):
+        logs, possible = _word_by_word(log10_likelihoods, steps, np.log(scanned.belief[:-1]))
+    belief = np.exp(logs[1:])
+    belief /= belief.sum(axis=1, keepdims=True)
+    return Filtered(np.concatenate([scanned.belief, belief]), np.concatenate([scanned.possible, possible[1:]]))
 
 
 def filter_logs(log10_likelihoods: Floats, steps: TransitionSteps) -> tuple[Floats, Mask]:
     """Log beliefs (T, C) and which words are possible (T,); `steps` (T-1): the predictions between T >= 1 words."""
-    if not steps.mixes:
-        return _word_by_word(log10_likelihoods, steps)
+    if steps.mixing < steps.count:
+        return _word_by_word(log10_likelihoods, steps, np.empty((0, log10_likelihoods.shape[1])))
     filtered = _scan(log10_likelihoods, steps)
     with np.errstate(divide="ignore"):
         return np.log(filtered.belief), filtered.possible
 
 
-def _word_by_word(log10_likelihoods: Floats, steps: TransitionSteps) -> tuple[Floats, Mask]:
-    """Log beliefs (T, C) and which words are possible (T,), in logarithms: slow, and right for the smallest beliefs."""
+def _word_by_word(log10_likelihoods: Floats, steps: TransitionSteps, known: Floats) -> tuple[Floats, Mask]:
+    """Log beliefs (n, C) and which words are possible (n,), in logarithms: slow, and right for the smallest beliefs.
+
+    Of the words (T, C) behind the first ones, whose log beliefs are `known` (T - n, C).
+    """
     places = log10_likelihoods.shape[1]
-    log_belief = [-log(places)] * places
+    log_belief = known[-1].tolist() if len(known) else [-log(places)] * places
     beliefs, possible = [], []
-    for t, row in enumerate(log10_likelihoods.tolist()):
+    for t, row in enumerate(log10_likelihoods[len(known) :].tolist(), start=len(known)):
         predicted = matrix_predictor(steps.matrices(slice(t - 1, t))[:, :, 0])(log_belief) if t else log_belief
-        log_belief, known = filter_step(predicted, row)
+        log_belief, explained = filter_step(predicted, row)
         beliefs.append(log_belief)
-        possible.append(known)
+        possible.append(explained)
     return np.array(beliefs), np.array(possible, bool)
 
 

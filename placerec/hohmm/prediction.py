@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from placerec.arrays import Floats, Ints
+from placerec.arrays import Floats, Ints, Mask
 from placerec.hohmm.transitions import Transition, fade
 
 Predict = Callable[[list[float]], list[float]]
@@ -24,8 +24,12 @@ class TransitionSteps(Protocol):
     """The prediction at each of T updates."""
 
     @property
-    def mixes(self) -> bool:
-        """Whether every prediction leaves every place more than MIXING."""
+    def count(self) -> int:
+        """T."""
+
+    @property
+    def mixing(self) -> int:
+        """How many predictions come before the first one that may leave a place MIXING or less; T if there is none."""
 
     def predict(self, states: Floats, at: slice | Ints) -> None:
         """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
@@ -47,9 +51,14 @@ class UniformMixing:
     even: bool
 
     @property
-    def mixes(self) -> bool:
-        """Whether every prediction leaves every place more than MIXING."""
-        return not len(self.spread) or bool(self.spread.min() / self.places > MIXING)
+    def count(self) -> int:
+        """The number of updates."""
+        return len(self.spread)
+
+    @property
+    def mixing(self) -> int:
+        """How many predictions come before the first one that may leave a place MIXING or less; T if there is none."""
+        return _leading(self.spread / self.places > MIXING)
 
     def predict(self, states: Floats, at: slice | Ints) -> None:
         """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
@@ -73,10 +82,15 @@ class MatrixSteps:
     tables: Floats = field(repr=False)
     which: Ints = field(repr=False)
 
+    @property
+    def count(self) -> int:
+        """The number of updates."""
+        return len(self.which)
+
     @cached_property
-    def mixes(self) -> bool:
-        """Whether every prediction leaves every place more than MIXING."""
-        return not len(self.which) or bool(self.tables.min() > MIXING)
+    def mixing(self) -> int:
+        """How many predictions come before the first one that may leave a place MIXING or less; T if there is none."""
+        return _leading((self.tables.min(axis=(0, 1)) > MIXING)[self.which])
 
     def predict(self, states: Floats, at: slice | Ints) -> None:
         """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
@@ -92,6 +106,11 @@ class MatrixSteps:
         """The matrices (C, C, m) at m of the updates; the first index is the place before."""
         matrices: Floats = self.tables[:, :, self.which[at]]
         return matrices
+
+
+def _leading(found: Mask) -> int:
+    """How many of the first values are true."""
+    return len(found) if found.all() else int(found.argmin())
 
 
 def transition_steps(transition: Transition, elapsed: Floats, *, backwards: bool = False) -> TransitionSteps:
@@ -119,7 +138,7 @@ def predict_logs(steps: TransitionSteps, logs: Floats, at: slice | Ints) -> Floa
     top = logs.max(axis=0)
     top = np.where(np.isfinite(top), top, 0.0)
     with np.errstate(divide="ignore"):
-        if steps.mixes:
+        if steps.mixing == steps.count:
             states: Floats = np.exp(logs - top)
             steps.predict(states, at)
             return np.log(states) + top

@@ -36,6 +36,14 @@ def test_blocks_of_any_size_give_the_same(case: Case, block: int, together: int,
     assert np.array_equal(blocks.possible, whole.possible)
 
 
+@given(cases(longest=30))
+def test_later_words_never_change_the_last_digit(case: Case) -> None:
+    """Also where they follow in no time, over which no place changes."""
+    whole = filter_stream(case.log10_p, case.transition, case.steps).belief
+    for n in range(1, len(whole)):
+        assert np.array_equal(filter_stream(case.log10_p[:n], case.transition, case.steps[:n]).belief, whole[:n])
+
+
 @settings(max_examples=40)
 @given(cases(longest=40))
 def test_word_by_word_is_the_array(case: Case) -> None:
