@@ -7,10 +7,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.lab.fittings import skin
 from placerec.lab.furniture import furniture
 from placerec.lab.light import Illumination, irradiance
-from placerec.lab.textures import Skin, paste
+from placerec.lab.textures import Skin, skin
 from placerec.lab.world import CEILING, ROOMS, Panel, walls
 
 Array = NDArray[np.float32]
@@ -118,5 +117,5 @@ def _surfaces() -> list[Panel]:
 def _skin(panel: Panel, rng: np.random.Generator, res: float) -> Skin:
     base = skin(rng, panel.skin, *panel.size, res)
     for kind, x, z, width, height in panel.parts:
-        paste(base, skin(rng, kind, width, height, res), x, z, res)
+        base.paste(skin(rng, kind, width, height, res), x, z)
     return base

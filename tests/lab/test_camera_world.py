@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from placerec.lab.camera import EYE, HALF_WIDTH, camera, develop, look
-from placerec.lab.fittings import PAINTERS, skin
 from placerec.lab.layout import SEQUENCES
 from placerec.lab.light import ILLUMINATIONS
 from placerec.lab.path import CLEARANCE, STEP, Timing, clear, drive, smooth, tour
 from placerec.lab.scene import BRIGHTEST, Scene, light_up, paint, panels_of_run
+from placerec.lab.textures import PAINTERS, skin
 from placerec.lab.world import CEILING, ROOMS, outline, place
 
 SLOW = Timing({"seq3": (720, 860), "seq4": (1000, 1110)}, 0.13, 0.4, 0.02)
