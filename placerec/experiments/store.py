@@ -32,8 +32,6 @@ from placerec.words.folder import VOCABULARY, write_tokens
 from placerec.words.tokenize import tokens_of
 
 FORMAT = "placerec experiments 3"
-# Frames that are described before their descriptors are written: enough to keep many processors at work.
-TOGETHER = 2000
 
 
 def key_of(*parts: object) -> str:
@@ -98,13 +96,15 @@ def describe_all(
     spec: DescriptorSpec,
     cache: Path,
     *,
+    together: int = 2000,
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> list[Described]:
     """Describe the frames of all sequences whose descriptors are not in the folder `cache` yet.
 
-    `work`: who does the work (`jobs.workers`), None for threads. `progress` is called with frames done and in all.
-    Raises ExperimentError for a file that cannot be read and for a sequence without a readable image.
+    `together`: frames that are described before their descriptors are written. `work`: who does the work
+    (`jobs.workers`), None for threads. `progress` is called with frames done and in all. Raises ExperimentError
+    for a file that cannot be read and for a sequence without a readable image.
     """
     folder = cache / "descriptors"
     described = [Described(one, spec, folder / f"{_key(one, spec)}.npz") for one in sequences]
@@ -113,10 +113,14 @@ def describe_all(
     done = total - sum(len(one.sequence.frames) for one in missing)
     if progress and done:
         progress(done, total)
-    for some in _batches(missing):
-        shown = (lambda n, _, start=done: progress(start + n, total)) if progress else None
-        _describe(some, spec, work, shown)
-        done += sum(len(one.sequence.frames) for one in some)
+    some: list[Described] = []
+    for one in missing:
+        some.append(one)
+        frames = sum(len(each.sequence.frames) for each in some)
+        if frames >= together or one is missing[-1]:
+            shown = (lambda n, _, start=done: progress(start + n, total)) if progress else None
+            _describe(some, spec, work, shown)
+            done, some = done + frames, []
     return described
 
 
@@ -133,17 +137,6 @@ def _usable(one: Described) -> bool:
     except (VisionError, KeyError, IndexError):
         return False
     return True
-
-
-def _batches(missing: Sequence[Described]) -> Iterator[list[Described]]:
-    some: list[Described] = []
-    for one in missing:
-        some.append(one)
-        if sum(len(each.sequence.frames) for each in some) >= TOGETHER:
-            yield some
-            some = []
-    if some:
-        yield some
 
 
 def _describe(

@@ -83,8 +83,8 @@ def test_numbers_in_the_text_are_in_a_table_of_their_section(program: ModuleType
 @each_set
 def test_a_grid_is_whole_sorted_and_small(folder: Path) -> None:
     rows, plan = read(folder / "results.csv"), read_config(folder.with_suffix(".toml"))
-    assert ",".join(rows[0]) == COLUMNS
-    assert COLUMNS.startswith(",".join((*KEY, "frames,accuracy,balanced_accuracy,majority_accuracy,same_word_run")))
+    assert tuple(rows[0]) == COLUMNS
+    assert COLUMNS[:12] == (*KEY, "frames", "accuracy", "balanced_accuracy", "majority_accuracy", "same_word_run")
     keys = [key(row) for row in rows]
     assert keys == sorted(keys)
     folds = {row["fold"] for row in rows}
@@ -99,7 +99,7 @@ def test_a_grid_is_whole_sorted_and_small(folder: Path) -> None:
 def test_sequences_sum_to_the_rows(folder: Path) -> None:
     counts: dict[tuple[int | str, ...], list[list[int]]] = {}
     lines = read(folder / "sequences.csv")
-    assert ",".join(lines[0]) == SEQUENCE_COLUMNS
+    assert ",".join(lines[0]) == ",".join(SEQUENCE_COLUMNS)
     for line in lines:
         counts.setdefault(key(line), []).append([int(number) for number in list(line.values())[8:]])
     for row in read(folder / "results.csv"):

@@ -6,6 +6,7 @@ A method is added in COMPARED alone: how it is fitted and run, what it is made o
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -89,12 +90,8 @@ class ComparedMethod:
 def train_models(encoded: EncodedSequences, training: int, cache: Path) -> PlaceModels:
     """The n-gram models of the first `training` sequences, with the default options, in a MODEL/ folder in `cache`."""
     streams, dictionary = encoded.streams[:training], encoded.dictionary
-    content = [
-        part
-        for stream in streams
-        for part in (stream.name, stream.places, stream.words, stream.times, stream.distances)
-    ]
-    path = cache / "models" / key_of(dictionary.fingerprint, *content)
+    content = [(one.name, one.places, one.words, one.times, one.distances) for one in streams]
+    path = cache / "models" / key_of(dictionary.fingerprint, *chain(*content))
     if not path.exists():
         sentences = [sentences_per_place([stream], Selection()) for stream in streams]
         record = record_streams(zip(streams, sentences, strict=True), dictionary.fingerprint)
@@ -103,9 +100,10 @@ def train_models(encoded: EncodedSequences, training: int, cache: Path) -> Place
     return load_model(path)
 
 
-def _run_words(name: str, transition: str, benchmark: Benchmark) -> MethodRun:
+def _words(name: str, transition: str = "fixed") -> ComparedMethod:
     """A method of `placerec decode`."""
-    return _decoded(make_decoder(name, benchmark.models, options=Decoding(transition=transition)), benchmark)
+    options = Decoding(transition=transition)
+    return ComparedMethod(lambda benchmark: _decoded(make_decoder(name, benchmark.models, options=options), benchmark))
 
 
 def _run_order1(benchmark: Benchmark) -> MethodRun:
@@ -194,10 +192,6 @@ def _timed(start: MakeStepper, benchmark: Benchmark, inputs: Sequence[Any]) -> M
     streams = [benchmark.encoded.streams[i] for i in benchmark.tests]
     beliefs = [Beliefs.of(one, benchmark.places, np.array(rows)) for one, rows in zip(streams, found, strict=True)]
     return MethodRun(beliefs, 1e6 * fastest / sum(map(len, inputs)))
-
-
-def _words(name: str, transition: str = "fixed") -> ComparedMethod:
-    return ComparedMethod(partial(_run_words, name, transition))
 
 
 def _points(

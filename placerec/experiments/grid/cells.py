@@ -28,6 +28,9 @@ from placerec.model import Corpus, ModelOptions, estimate_place, read_corpus
 from placerec.words import Selection, WordStream, parse_selection, place_steps
 from placerec.words.folder import read_streams
 
+# What is kept of an evaluation, beside counts for every sequence.
+KEPT = ("frames", "accuracy", "balanced_accuracy", "majority_accuracy", "change_latency_frames", "log_loss", "ece")
+
 
 class GridCell(NamedTuple):
     """How models are made of selected words, and how the filter uses them."""
@@ -175,14 +178,7 @@ def _frame_wise(streams: _Streams, smoothing: str) -> dict[str, int]:
 def judged(beliefs: Sequence[Beliefs]) -> dict[str, Any]:
     """What is kept of an evaluation, in plain values."""
     found = evaluate(beliefs)
-    return {
-        "frames": found.frames,
-        "accuracy": found.accuracy,
-        "balanced_accuracy": found.balanced_accuracy,
-        "majority_accuracy": found.majority_accuracy,
-        "change_latency_frames": found.change_latency_frames,
-        "log_loss": found.log_loss,
-        "ece": found.ece,
+    return {name: getattr(found, name) for name in KEPT} | {
         "sequences": {one.name: _counts_of(one) for one in beliefs},
         "majority": {one.name: one.truth.count(found.majority_place) for one in beliefs},
     }

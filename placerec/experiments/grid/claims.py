@@ -188,8 +188,7 @@ def _behind_with_unique(s: Scores) -> Floats:
 
 
 def _spread_with_unique(s: Scores) -> Floats:
-    own = _spread(s, UNIQUE)
-    others = [_spread(s, name) for name in _others(s, UNIQUE)]
+    own, others = _spread(s, UNIQUE), [_spread(s, name) for name in _others(s, UNIQUE)]
     if not others:
         raise MissingCellsError("the grid has no other selection")
     least: Floats = np.min(others, axis=0)

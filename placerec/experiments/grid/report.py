@@ -4,30 +4,18 @@ import platform
 import shlex
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from os.path import relpath
 from pathlib import Path
 
 from placerec.errors import ExperimentError
-from placerec.evaluation import Evaluation, evaluate
+from placerec.evaluation import evaluate
+from placerec.experiments.grid import tables
 from placerec.experiments.grid.cells import GridCell, GridJob, believe_cell
 from placerec.experiments.grid.claims import judge
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
 from placerec.experiments.grid.results import Results, Setting
-from placerec.experiments.grid.tables import (
-    Table,
-    best_table,
-    claims_table,
-    format_claims,
-    format_tables,
-    images_table,
-    ranked,
-    reading,
-    runs_table,
-    verdicts_table,
-)
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
@@ -65,32 +53,30 @@ def _contents(out: Path) -> dict[str, str]:
 
 
 def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob], out: Path) -> None:
-    note = reading(len({name for row in results.rows for name in row.sequences}), plan.seeds)
+    note = tables.reading(len({name for row in results.rows for name in row.sequences}), plan.seeds)
     claims = {transition: judge(results, transition) for transition in plan.transition}
-    write_text(out / "tables.md", format_tables(results))
-    write_text(out / "claims.md", format_claims(claims, note))
+    write_text(out / "tables.md", tables.format_tables(results))
+    write_text(out / "claims.md", tables.format_claims(claims, note))
+    best = tables.ranked(results)[0]
     body = [
         paragraph(_what(results, plan, config)),
         heading("Frames right"),
         *_figures(results, plan, out),
-        _table(best_table(results), "The ten best of the grid, with what is right without any filter."),
+        table(*tables.best_table(results), "The ten best of the grid, with what is right without any filter."),
         heading("The paper's claims"),
-        _table(verdicts_table(claims), "Verdicts; the numbers are below."),
+        table(*tables.verdicts_table(claims), "Verdicts; the numbers are below."),
         paragraph(note),
-    ]
-    for transition, judged in claims.items():
-        body += [_table(claims_table(judged), f"With {transition} transitions.")]
-    body += [
+        *(table(*tables.claims_table(claims[name]), f"With {name} transitions.") for name in claims),
         heading("The data"),
-        _table(images_table(results.folds), "Labelled images per place and split."),
-        _table(runs_table(results.rows), "Frames in a row with the same word, in training."),
+        table(*tables.images_table(results.folds), "Labelled images per place and split."),
+        table(*tables.runs_table(results.rows), "Frames in a row with the same word, in training."),
         *_closer_look(results, jobs),
         heading("Do it again"),
         preformatted(f"placerec experiment {shlex.quote(config.name)} -o {shlex.quote(out.resolve().name)}/"),
         paragraph(f"{config.name}:"),
         preformatted(read_text(config, ExperimentError)),
-        paragraph(f"The best way of the grid, step by step ({ranked(results)[0]}; seed 0):"),
-        preformatted(commands_of(plan, ranked(results)[0], _of(jobs, ranked(results)[0])[0])),
+        paragraph(f"The best way of the grid, step by step ({best}; seed 0):"),
+        preformatted(commands_of(plan, best, _of(jobs, best)[0])),
         preformatted(_versions()),
     ]
     write_text(out / "report.html", html_page(f"placerec experiment: {config.stem}", body))
@@ -125,54 +111,43 @@ def _what(results: Results, plan: Config, config: Path) -> str:
     )
 
 
-def _table(content: Table, caption: str) -> str:
-    header, lines = content
-    return table(header, lines, caption)
-
-
-@dataclass(frozen=True)
-class _CloserLook:
-    """A setting with seed 0, its beliefs over the test sequences of all folds, and their evaluation."""
-
-    setting: Setting
-    beliefs: list[Beliefs]
-    evaluation: Evaluation
-
-
 def _of(jobs: Sequence[GridJob], setting: Setting) -> list[GridJob]:
     """The jobs of a setting with seed 0, one per fold."""
     return [job for job in jobs if (job.size, job.seed, job.work.select) == (setting.size, 0, setting.select)]
 
 
-def _look_at(jobs: Sequence[GridJob], setting: Setting) -> _CloserLook:
+def _beliefs(jobs: Sequence[GridJob], setting: Setting) -> list[Beliefs]:
+    """The beliefs of a setting with seed 0 over the test sequences of all folds."""
     cell = GridCell(setting.smoothing, setting.order, setting.transition)
-    beliefs = [one for job in _of(jobs, setting) for one in believe_cell(job.work, cell)]
-    return _CloserLook(setting, beliefs, evaluate(beliefs))
+    return [one for job in _of(jobs, setting) for one in believe_cell(job.work, cell)]
 
 
 def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
     """Belief strips and confusion matrices of the best setting, and its words."""
-    best = _look_at(jobs, ranked(results)[0])
-    first = best.setting._replace(order=min(row.order for row in results.rows))
-    looks = [best] if first == best.setting else [best, _look_at(jobs, first)]
+    best = tables.ranked(results)[0]
+    beliefs = _beliefs(jobs, best)
+    found = {best: evaluate(beliefs)}
+    first = best._replace(order=min(row.order for row in results.rows))
+    if first != best:
+        found[first] = evaluate(_beliefs(jobs, first))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         yield heading("Belief over time")
-        caption = f"The sequences with the most and the fewest frames right: {best.setting}, seed 0."
+        caption = f"The sequences with the most and the fewest frames right: {best}, seed 0."
         strips, narrow = folder / "strips.png", folder / "narrow.png"
-        draw_strips(best.beliefs, best.evaluation, strips, 11)
-        draw_strips(best.beliefs, best.evaluation, narrow, 5)
+        draw_strips(beliefs, found[best], strips, 11)
+        draw_strips(beliefs, found[best], narrow, 5)
         yield picture(strips, "Beliefs of two test sequences", caption, narrow=narrow)
         yield heading("What is confused")
-        for number, look in enumerate(looks):
+        for number, (setting, evaluation) in enumerate(found.items()):
             path = folder / f"confusion{number}.png"
-            draw_confusion(look.evaluation, path)
-            yield picture(path, "Confusion matrix", f"{look.setting}, seed 0, all folds.")
-        images = _of(jobs, best.setting)[0].images
+            draw_confusion(evaluation, path)
+            yield picture(path, "Confusion matrix", f"{setting}, seed 0, all folds.")
+        images = _of(jobs, best)[0].images
         if images is not None:
             yield heading("The words")
             _draw_words(images, folder / "words.png")
-            caption = f"The words of S = {best.setting.size}, seed 0, among the test frames of the first fold."
+            caption = f"The words of S = {best.size}, seed 0, among the test frames of the first fold."
             yield picture(folder / "words.png", "For each word a typical frame", caption)
 
 
@@ -199,8 +174,7 @@ def _versions() -> str:
 
 def commands_of(plan: Config, setting: Setting, job: GridJob) -> str:
     """The commands that make a setting's result on the fold of `job`, run in the folder of the config."""
-    lines = []
-    tokens = "tokens"
+    lines, tokens = [], "tokens"
     if job.images is not None:
         sources = [[_from(plan, one.sequence.source) for one in part] for part in (job.images.train, job.images.test)]
         words = f"-o words.npz --size {setting.size} --seed {job.seed} --units {plan.units}"

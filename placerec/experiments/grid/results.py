@@ -21,13 +21,13 @@ from placerec.arrays import Floats
 from placerec.evaluation.bootstrap import DRAWS, draw
 from placerec.files import write_text
 
+_CELL = ("size", "seed", "fold", "smoothing", "select", "order", "transition")
 COLUMNS = (
-    "size,seed,fold,smoothing,select,order,transition,frames,accuracy,balanced_accuracy,majority_accuracy,"
-    "same_word_run,frame_wise_accuracy,change_latency_frames,log_loss,ece"
+    *_CELL,
+    *("frames", "accuracy", "balanced_accuracy", "majority_accuracy", "same_word_run", "frame_wise_accuracy"),
+    *("change_latency_frames", "log_loss", "ece"),
 )
-SEQUENCE_COLUMNS = (
-    "size,seed,fold,smoothing,select,order,transition,sequence,frames,right,frame_wise_right,majority_right,late"
-)
+SEQUENCE_COLUMNS = (*_CELL, "sequence", "frames", "right", "frame_wise_right", "majority_right", "late")
 
 
 @dataclass(frozen=True)
@@ -119,10 +119,10 @@ def by_seed(
 
 def write_results(results: Results, out: Path) -> None:
     """Write results.csv and sequences.csv into `out`."""
-    rows = ([_cell(getattr(row, name)) for name in COLUMNS.split(",")] for row in results.rows)
+    rows = ([_cell(getattr(row, name)) for name in COLUMNS] for row in results.rows)
     write_text(out / "results.csv", _csv(COLUMNS, rows))
     counts = (
-        [*(getattr(row, key) for key in COLUMNS.split(",")[:7]), name, *vars(one).values()]
+        [*(getattr(row, key) for key in _CELL), name, *vars(one).values()]
         for row in results.rows
         for name, one in row.sequences.items()
     )
@@ -133,11 +133,9 @@ def _cell(value: object) -> object:
     return f"{value:.6f}" if isinstance(value, float) else "" if value is None else value
 
 
-def _csv(header: str, rows: Iterable[Sequence[object]]) -> str:
+def _csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header.split(","))
-    writer.writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([header, *rows])
     return text.getvalue()
 
 
@@ -205,16 +203,9 @@ def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
     weights = drawn(len(names), draws)
     whole = weights @ frames
     with np.errstate(invalid="ignore", divide="ignore"):
-        accuracy = 100 * np.einsum("abcds,ns->abcdn", right, weights) / whole
-        return Scores(
-            size,
-            smoothing,
-            select,
-            order,
-            names,
-            np.nan_to_num(accuracy),
-            np.nan_to_num(100 * (weights @ majority) / whole),
-        )
+        accuracy = np.nan_to_num(100 * np.einsum("abcds,ns->abcdn", right, weights) / whole)
+        always = np.nan_to_num(100 * (weights @ majority) / whole)
+    return Scores(size, smoothing, select, order, names, accuracy, always)
 
 
 def drawn(sequences: int, draws: int) -> Floats:

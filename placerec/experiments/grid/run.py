@@ -4,14 +4,15 @@ import glob
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from placerec.errors import ExperimentError
-from placerec.experiments.grid.cells import CellJob, GridCell, GridJob, run_cells
+from placerec.experiments.grid.cells import KEPT, CellJob, GridCell, GridJob, run_cells
 from placerec.experiments.grid.config import Config, read_config
 from placerec.experiments.grid.report import write_reports
-from placerec.experiments.grid.results import FoldData, Results, Row, SequenceCount, write_results
+from placerec.experiments.grid.results import COLUMNS, FoldData, Results, Row, SequenceCount, write_results
 from placerec.experiments.grid.splits import SPLITS, Fold, named_tests
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, make_tokens
 from placerec.figures.canvas import check_figure
@@ -50,7 +51,7 @@ def run_grid(
     plan: Config, out: Path, *, jobs: int = 1, progress: ProgressBar = silent
 ) -> tuple[list[GridJob], Results]:
     """The jobs of a config and the rows of all their cells, which are written to `out`."""
-    todo = find_jobs(plan, out, jobs=jobs, progress=progress)
+    todo = list(_token_jobs(plan, out) if plan.tokens else _image_jobs(plan, out, jobs, progress))
     log.info("%d cells", sum(len(job.work.cells) for job in todo))
     with progress("recognise") as show:
         found = map_jobs(run_cells, [job.work for job in todo], jobs=jobs, progress=show)
@@ -59,16 +60,11 @@ def run_grid(
     return todo, results
 
 
-def find_jobs(plan: Config, out: Path, *, jobs: int, progress: ProgressBar) -> list[GridJob]:
-    """All jobs of a config; token streams are made of images, as far as `out`/cache does not hold them."""
-    return list(_token_jobs(plan, out) if plan.tokens else _image_jobs(plan, out, jobs, progress))
-
-
 def _image_jobs(plan: Config, out: Path, jobs: int, progress: ProgressBar) -> Iterator[GridJob]:
     sequences = find_images(plan.sequences, plan.folder)
     folds = _folds(plan, [sequence.name for sequence in sequences])
     with progress("describe") as show:
-        described = describe_all(sequences, SPEC, out / "cache", work=workers(jobs), progress=show)
+        described = describe_all(sequences, SPEC, out / "cache", together=1, work=workers(jobs), progress=show)
     of = {one.sequence.name: one for one in described}
     todo = {}
     for size, seed, fold in product(plan.size, range(plan.seeds), folds):
@@ -133,30 +129,21 @@ def collect(jobs: Sequence[GridJob], found: Sequence[Mapping[str, Any]]) -> Resu
     for job, results in zip(jobs, found, strict=True):
         folds[job.fold.name] = FoldData(results["data"]["train"], results["data"]["test"])
         rows += [_row(job, cell, results) for cell in job.work.cells]
-    return Results(sorted(rows, key=_place_in_file), folds)
-
-
-def _place_in_file(row: Row) -> tuple[int | str, ...]:
-    return row.size, row.seed, row.fold, row.smoothing, row.select, row.order, row.transition
+    return Results(sorted(rows, key=attrgetter(*COLUMNS[:7])), folds)
 
 
 def _row(job: GridJob, cell: GridCell, results: Mapping[str, Any]) -> Row:
-    found = results[job.work.name(cell)]
-    frame_wise, data = results[f"frame-wise {cell.smoothing}"], results["data"]
-    labels = found["majority"]
+    found, frame_wise = results[job.work.name(cell)], results[f"frame-wise {cell.smoothing}"]
     return Row(
         size=job.size,
         seed=job.seed,
         fold=job.fold.name,
         select=job.work.select,
-        same_word_run=data["same_word_run"],
+        same_word_run=results["data"]["same_word_run"],
         sequences={
-            name: SequenceCount(frames, right, frame_wise[name], labels[name], late)
+            name: SequenceCount(frames, right, frame_wise[name], found["majority"][name], late)
             for name, (frames, right, late) in found["sequences"].items()
         },
         **cell._asdict(),
-        **{name: found[name] for name in _KEPT},
+        **{name: found[name] for name in KEPT},
     )
-
-
-_KEPT = ("frames", "accuracy", "balanced_accuracy", "majority_accuracy", "change_latency_frames", "log_loss", "ece")
