@@ -149,7 +149,7 @@ def _decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
         points += point
         plain &= numeral | point | (j >= length) | (negative if j == 0 else False)
     plain &= (points <= 1) & (length - points - negative > 0)
-    # As above.
+    # Both are exact, so that the quotient is the float64 nearest to the decimal number.
     value = digits / _TENS[behind]
     return np.where(negative, -value, value), plain
 

@@ -24,7 +24,7 @@ _DECIMAL = re.compile(r"-?\d*\.?\d*", re.ASCII)
 
 
 class _FormatError(Exception):
-    """What is wrong with the line just read."""
+    """The line just read cannot be part of an ARPA file; the text says why."""
 
 
 class Reader:
@@ -118,13 +118,13 @@ class Reader:
         return end
 
     def take_lines(self, data: bytes) -> None:
-        """Lines, one by one."""
+        """Take whole lines one by one."""
         for line in data.decode("latin-1").removesuffix("\n").split("\n"):
             self.number += 1
             self.take(line)
 
     def quick_block(self, chunk: bytes) -> Block | None:
-        """The lines at once; None if one of them is unusual."""
+        """The n-grams of whole lines, all at once; None if one of the lines is unusual."""
         n = self.section
         weights = "zero" if n == self.top else "ignore" if n == self.order else "read"
         if (n == 1 and self.limited) or (self.words.lower and chunk != chunk.lower()):
@@ -132,18 +132,18 @@ class Reader:
         return parse_block(chunk, n, self.added if n == 1 else self.known, weights=weights)
 
     def added(self, fields: Fields, at: Ints) -> Ints:
-        """The numbers of words, which are added where they are new."""
+        """SRILM's numbers of the fields `at`, which are added to the words where they are new."""
         return np.array([self.words.add(fields.text(i).decode("latin-1")) for i in at.tolist()], np.int64)
 
     def known(self, fields: Fields, at: Ints) -> Ints:
-        """The numbers of words, -1 of those that are not listed."""
+        """SRILM's numbers of the fields `at`, -1 for words that are not listed."""
         names = self.names
         if names is None or names.size != len(self.words.index):
             names = self.names = NameTable(self.words.index)
         return names.find(fields, at)
 
     def take(self, line: str) -> None:
-        """One line, in the state that the lines before have led to."""
+        """Take one line in the state that the lines before have led to."""
         if not line.strip(SPACES) or line.startswith("##"):
             return
         if self.state == "before":
@@ -159,7 +159,7 @@ class Reader:
             self.ngram(line)
 
     def promise(self, line: str) -> None:
-        """A line of the header."""
+        """Take a line of the header, `ngram N=SIZE`."""
         match = _COUNT.match(line)
         if not match:
             raise _FormatError("unexpected input")
@@ -171,7 +171,7 @@ class Reader:
         self.promised[n] = size
 
     def begin(self, n: int) -> None:
-        """The headline of a section."""
+        """Begin the section of the n-grams of order n."""
         self.close()
         if not 1 <= n <= self.top:
             raise _FormatError(f"invalid ngram order {n}")
@@ -182,12 +182,12 @@ class Reader:
         self.say(f"{'skipping' if skipped else 'reading'} {self.promised.get(n, 0)} {n}-grams", 1)
 
     def keep(self, block: Block) -> None:
-        """Keep n-grams of this section."""
+        """Keep n-grams of the present section."""
         if len(block.lines):
             self.blocks.setdefault(self.section, []).append(block)
 
     def keep_lines(self) -> None:
-        """Keep what was read line by line."""
+        """Keep, as one block, the n-grams that were read line by line."""
         if self.slow:
             lines, words, log10_p, weighted, backoff = map(np.array, zip(*self.slow, strict=True))
             single = np.float32
@@ -195,7 +195,7 @@ class Reader:
             self.slow = []
 
     def close(self) -> None:
-        """The end of a section."""
+        """End the present section."""
         self.keep_lines()
         if self.outside and self.limited:
             self.say(f"discarded {self.outside} OOV {self.section}-grams", 1)
@@ -210,7 +210,7 @@ class Reader:
         self.state = "done"
 
     def ngram(self, line: str) -> None:
-        """A line with an n-gram."""
+        """Take a line with an n-gram."""
         n = self.section
         fields = tokens(line)
         if len(fields) not in (n + 1, n + 2):
@@ -230,7 +230,7 @@ class Reader:
         self.slow.append((self.number, [self.words.add(word) for word in names], log10_p, weighted, backoff))
 
     def weight(self, text: str) -> float:
-        """The backoff weight at the end of a line."""
+        """The backoff weight that the text at the end of a line is."""
         if self.section == self.top:
             if text[0] != "0":
                 self.say(f'{self.position}ignoring non-zero bow "{text}" for maximal ngram')
@@ -245,7 +245,7 @@ class Reader:
         return backoff
 
     def warn_of_unknown(self) -> None:
-        """Once: the unknown word has a probability, though it should have none."""
+        """Say, once, that the unknown word has a probability though the vocabulary is closed."""
         words = self.words
         if words.unknown not in words.non_events:
             return
@@ -263,7 +263,10 @@ class Reader:
 def read_tables(
     name: str, words: WordList, streams: Streams, *, order: int, debug: int = 0, limited: bool = False
 ) -> ScoreTables:
-    """Read an ARPA file as `read_model` does: the same words, messages, errors and probabilities."""
+    """Read an ARPA file up to `order` for scoring only, adding its words to `words`, and say what is odd about it.
+
+    `limited`: n-grams with other words than those of `words` are left out. Raises SrilmError if the file is of no use.
+    """
     reader = Reader(name, words, streams, order, limited)
     reader.read()
     tables = _regular_tables(reader)
@@ -278,7 +281,7 @@ def read_tables(
 
 
 def _regular_tables(reader: Reader) -> ScoreTables | None:
-    """None after a failure, and where the orders do not follow each other."""
+    """The tables of what was read; None after a failure, and where the orders do not follow each other."""
     ends = [line for _, its in sorted(reader.blocks.items()) for block in its for line in block.lines[[0, -1]].tolist()]
     if reader.failure or not reader.blocks or ends != sorted(ends):
         return None

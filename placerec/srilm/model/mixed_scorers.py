@@ -170,8 +170,9 @@ class CachedView:
 
 @dataclass(frozen=True)
 class Lenient:
-    """A scorer with a fixed log10 p for the unknown word (-unk-prob), and a word (-zeroprob-word) whose probability
-    stands in where another's is 0.
+    """A scorer with exceptions: for the unknown word (-unk-prob), and for probabilities of 0 (-zeroprob-word).
+
+    `unknown_p`: log10 p of the unknown word. `stand_in`: the word whose probability replaces one of 0.
     """
 
     base: Scorer

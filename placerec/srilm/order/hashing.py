@@ -20,13 +20,13 @@ _SMALL = 8
 
 
 def needed(entries: Ints) -> Ints:
-    """The slots that tables of so many entries need at least, int64."""
+    """The least slots of tables for so many `entries` each, int64."""
     single = np.float32(0.8)
     return np.where(entries < _SMALL, entries, ((entries + 1).astype(np.float32) / single).astype(np.int64))
 
 
 def capacities(entries: Ints) -> Ints:
-    """The slots that tables have which were made for so many entries: powers of two, int64."""
+    """The slots of tables that are made for so many `entries` each: powers of two, int64."""
     return 1 << np.ceil(np.log2(np.maximum(needed(entries), 1))).astype(np.int64)
 
 

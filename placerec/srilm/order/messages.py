@@ -55,7 +55,7 @@ class Messages(Trace):
         return " ".join(found)
 
     def estimated(self, n: int, contexts: Ints) -> Ints:
-        """The place of contexts of order n in estimation."""
+        """The places int64 (c,) of the contexts of n-grams of order n in the order in which estimation visits them."""
         return self.visited(n - 1, contexts) if n > 1 else contexts
 
     def _say_of(
@@ -224,7 +224,10 @@ class ContextTimes:
 
 
 def message_order(trie: Trie, times: ContextTimes) -> ContextOrder:
-    """Places of contexts of a model over `trie` that was read as `times` tells; others come last, by their words."""
+    """Gives the places of contexts of a model over `trie` in SRILM's walk; `times`: when contexts were read.
+
+    Contexts that were not read come last, in the order of their words.
+    """
     ranks: list[Ints] = []
 
     def places(n: int, contexts: Ints) -> Ints:
@@ -245,7 +248,7 @@ def message_order(trie: Trie, times: ContextTimes) -> ContextOrder:
 
 
 def _same_rows(trie: Trie, other: Trie, n: int, rows: Ints) -> Ints:
-    """The rows of `other` with the same words, -1 where there are none."""
+    """The rows of `other` that hold the words of `rows` of order n of `trie`, -1 where there are none."""
     numbers = np.empty((len(rows), n), np.int64)
     for k in range(n, 0, -1):
         numbers[:, k - 1] = trie.word(k)[rows]

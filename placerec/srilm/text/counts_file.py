@@ -39,12 +39,12 @@ class Table:
     counts: list[float] = field(default_factory=list)
 
     def add(self, ngram: list[int], count: float) -> None:
-        """One more n-gram."""
+        """Append an n-gram and its count."""
         self.ngrams.append(ngram)
         self.counts.append(count)
 
     def emptied(self) -> "Table":
-        """The same n-grams, each with count 0."""
+        """The n-grams of this table, each with count 0."""
         return Table(self.ngrams, [0.0] * len(self.ngrams))
 
     def within(self, other: "Table") -> "Table":
@@ -76,7 +76,7 @@ class Table:
         return table
 
     def count(self, order: int, words: "WordList", *, fractional: bool) -> "NgramCounts":
-        """The sums over the sorted vocabulary."""
+        """The counts of the n-grams up to `order` over the sorted vocabulary; repeated n-grams add up."""
         # Not needed by ngram-merge, which starts much sooner without.
         import numpy as np
 

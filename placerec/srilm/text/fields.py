@@ -81,7 +81,10 @@ def split_lines(data: bytes) -> tuple[Fields, Ints]:
 
 
 def _single_blanks(data: bytes, at: Ints, kind: NDArray[np.uint8]) -> tuple[Fields, Ints] | None:
-    """The same where one separator stands behind every field, as programs write lines; `kind` (f,) `at` places (f,)."""
+    """The fields of lines, and how many in each, if one separator stands behind every field, as programs write them.
+
+    `at`, `kind` (f,): the places of all separators, and which bytes they are. None if some field is empty.
+    """
     starts = np.empty_like(at)
     starts[:1] = 0
     np.add(at[:-1], 1, out=starts[1:])

@@ -3,21 +3,23 @@
 Lines are taken many at a time; line by line from where the first NUL, VT or FF is, and where more than words is asked.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from io import BytesIO
 from itertools import chain
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from placerec.ahead import make_ahead
 from placerec.arrays import Ints, Mask
-from placerec.lm.stored_text import Numbers
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, add_markers, find_markers
 from placerec.srilm.text.fields import Fields, NameTable, comments, split_lines, usual_blocks, without_lines
 from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import Lines, tokens
 from placerec.srilm.text.vocabulary import WordList
+
+if TYPE_CHECKING:
+    from placerec.lm.stored_text import Numbers
 
 LONGEST = 50000
 # Bytes read at once where lines are as programs write them, and words where they are not.
@@ -46,6 +48,12 @@ class Handling(NamedTuple):
     noise: frozenset[int] = frozenset()
 
 
+def handling_of(options: Mapping[str, Any], **others: Any) -> Handling:
+    """What the options for text that several commands have ask for, and `others` that one command adds."""
+    weight = "last" if options["text-has-weights-last"] else "first" if options["text-has-weights"] else ""
+    return Handling(not options["no-sos"], not options["no-eos"], weight=weight, **others)
+
+
 class Sentences(NamedTuple):
     """Lines as SRILM's word numbers (T,), lengths (S,), weights (S,); `shown`: their words, if `verbose`.
 
@@ -54,7 +62,7 @@ class Sentences(NamedTuple):
 
     numbers: Ints
     lengths: Ints
-    weights: Numbers
+    weights: "Numbers"
     shown: Sequence[str] = ()
     escapes: Sequence[tuple[int, str]] = ()
 

@@ -1,4 +1,4 @@
-"""Files and talk as SRILM has them: section 2.2 of our SRILM specification.
+"""The files and messages of SRILM's commands: section 2.2 of our SRILM specification.
 
 Text is handled as bytes kept in str (Latin-1), so that no byte is lost and words sort by their bytes.
 """
@@ -91,7 +91,7 @@ class Streams:
                 yield from _packed_into(file, suffix)
 
     def write(self, name: str, text: str) -> None:
-        """Write a file whole, as `output` does."""
+        """Write a file whole (`-`: standard output), packed by its suffix."""
         with self.output(name) as file:
             file.write(text.encode("latin-1"))
 
@@ -198,7 +198,7 @@ def _packing(name: str) -> str:
 
 @contextmanager
 def _named(name: str) -> Iterator[None]:
-    """What goes wrong with a file becomes SrilmError with its name in front."""
+    """Turns what the system refuses, and damaged packed files, into SrilmError with `name` in front."""
     try:
         yield
     except (OSError, EOFError, zlib.error) as error:

@@ -86,7 +86,7 @@ class WordList:
         return [count[self.index[word]] for word in vocabulary.words]
 
     def sorted(self) -> "tuple[Vocabulary, Ints]":
-        """The words in code-point order, and the number there of each number here, int64 (N,), -1 where it is lost."""
+        """The words in code-point order, and by number here each word's number there, int64 (N,), -1 if lost."""
         from placerec.lm.vocabulary import Vocabulary
 
         vocabulary = Vocabulary.of(word for word in self.words if word is not None)

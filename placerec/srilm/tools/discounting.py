@@ -188,7 +188,10 @@ class Fitter:
         return _kneser_ney_rule(discounts, choice.minimum, choice.interpolate)
 
     def prepare(self, n: int, *, silent: bool = False) -> bool:
-        """Step A of section 5.3, once for each order below the highest; whether there was something to do."""
+        """Count left neighbours in place of occurrences (step A of section 5.3), once per order below the highest.
+
+        Returns whether there was something to do.
+        """
         if n >= self.counts.order or n in self.modified or self.options["kn-counts-modified"]:
             return False
         if self.debug and not silent:
@@ -198,7 +201,7 @@ class Fitter:
         return True
 
     def prepare_late(self) -> list[int]:
-        """Step A for the orders whose parameters were read: SRILM does it when estimation comes to them."""
+        """Change the counts of the orders whose parameters were read, as SRILM does during estimation; returns the orders."""
         return [n for n in sorted(self.late) if self.prepare(n, silent=True)]
 
     def _read(self, choice: Choice) -> Rule:

@@ -10,7 +10,7 @@ from placerec.lm.score import TokenSequence
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.model.arpa_reader import read_tables
 from placerec.srilm.model.scorers import Model, Scorer, event_mask
-from placerec.srilm.text.sentences import Handling
+from placerec.srilm.text.sentences import Handling, handling_of
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.text.vocabulary import PAUSE, WordList, format_words, read_aliases, read_words
 from placerec.srilm.tools.options import Option, Options, Parsed, parse
@@ -222,18 +222,16 @@ class _Run:
         if options["noise-vocab"]:
             for line in self.streams.lines(options["noise-vocab"]):
                 noise |= {self.words.add(word) for word in tokens(line)[:1]}
-        return Handling(
-            start=not options["no-sos"],
-            end=not options["no-eos"],
+        return handling_of(
+            options.values,
             reverse=options["reverse"],
-            weight="last" if options["text-has-weights-last"] else "first" if options["text-has-weights"] else "",
             escape=options["escape"],
             verbose=options["debug"] >= 1,
             noise=frozenset(noise),
         )
 
     def print_counts(self, scorer: Scorer, printer: Printer) -> None:
-        """`-counts`."""
+        """Score the n-grams of the counts file of `-counts`, and print what `-debug` asks for."""
         options = self.options
         order = options["count-order"] or self.order
         counting = Counting(order, options["float-counts"], options["counts-entropy"], options["escape"])

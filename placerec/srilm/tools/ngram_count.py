@@ -14,7 +14,7 @@ from placerec.lm.prune import prune
 from placerec.lm.stored_text import StoredText
 from placerec.srilm.order.counts import EstimationMessages, FirstSeen
 from placerec.srilm.text.counts_file import Table, parse_count, read_counts
-from placerec.srilm.text.sentences import Handling, mark, read_sentences
+from placerec.srilm.text.sentences import handling_of, mark, read_sentences
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 from placerec.srilm.text.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
 from placerec.srilm.tools.discounting import MODIFYING, Fitter, choose, given_method, meta_occurrences
@@ -159,15 +159,9 @@ def _read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[Ngram
 
 
 def _read_text(options: Parsed, words: WordList, streams: Streams) -> StoredText:
-    """The sentences of the text with their markers, as SRILM's word numbers; with -debug 1, how many are told."""
-    handling = Handling(
-        start=not options["no-sos"],
-        end=not options["no-eos"],
-        adding=True,
-        weight="last" if options["text-has-weights-last"] else "first" if options["text-has-weights"] else "",
-        parse_weight=partial(parse_count, fractional=options["float-counts"]),
-        too_long="line too long?",
-    )
+    """The sentences of `-text` between markers, as SRILM's word numbers; with -debug 1, tells how many there are."""
+    parse_weight = partial(parse_count, fractional=options["float-counts"])
+    handling = handling_of(options.values, adding=True, parse_weight=parse_weight, too_long="line too long?")
     text = StoredText()
     lines = streams.lines(options["text"])
     sentences = found = unknown = 0

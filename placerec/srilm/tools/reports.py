@@ -22,7 +22,7 @@ TOKENS, SUMS, RANKS = 2, 3, 4
 
 
 def block(totals: Totals, ranks: Ranks | None = None) -> str:
-    """The statistics of section 10.2, with those of debug level 4 if `ranks` are given."""
+    """The block of statistics (section 10.2): totals and perplexities, and of -debug 4 the `ranks`."""
     text = f"{totals.sentences:.16g} sentences, {totals.words:.16g} words, {totals.oovs:.16g} OOVs\n"
     if not totals.words + totals.sentences > 0:
         return text
@@ -67,11 +67,11 @@ class Printer:
         return event_numbers(self.words)
 
     def name(self, number: int) -> str:
-        """The word of a number."""
+        """The word that has this number of SRILM's."""
         return str(self.words.words[number])
 
     def token(self, word: int, context: str, tag: str, p: float, log10_p: float, weight: float = 1) -> str:
-        """The start of a token's line (section 10.3)."""
+        """The line of a token without its end: p( WORD | CONTEXT) = TAG P [ LOG10P ] (section 10.3)."""
         times = "" if weight == 1 else f" *{weight:.7g}"
         return f"\tp( {self.name(word)} | {context}) \t= {tag} {_number(p)} [ {_number(log10_p)}{times} ]"
 
@@ -86,7 +86,7 @@ class Printer:
         return f" / {_number(total)}"
 
     def rank(self, view: View, t: int, word: int, log10_p: float, *, end: bool, weight: float = 1) -> Ranks:
-        """The ranks of a token."""
+        """The rank of a token's word among all words, as tallies of one token."""
         known = word != self.words.index[self.words.unknown]
         return rank_word(log10_p, view.distribution(t)[self.events], known=known, end=end, weight=weight)
 
@@ -130,7 +130,7 @@ def _sequence(marked: Marked) -> TokenSequence:
 
 
 class _Batch(NamedTuple):
-    """Sentences: their words, and of each its length (S,), whether it ends in </s> (S,), and its weight (S,)."""
+    """Sentences: their words, lengths (S,), whether they end in </s> (S,), and weights (S,)."""
 
     part: TokenSequence
     lengths: Ints
