@@ -13,7 +13,7 @@ from placerec.hohmm.beliefs import (
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.decoder import Belief, Posterior, SequenceDecoder, TakeIn
 from placerec.hohmm.evidence import Emissions, SeparateEmissions
-from placerec.hohmm.filter import Filtered, filter_stream
+from placerec.hohmm.filter import filter_stream
 from placerec.hohmm.recognizer import Recognizer
 from placerec.hohmm.transitions import PER, Transition, fixed_transition, learned_transition, read_transitions
 
@@ -24,7 +24,6 @@ __all__ = [
     "Beliefs",
     "Calibration",
     "Emissions",
-    "Filtered",
     "Posterior",
     "Recognizer",
     "SeparateEmissions",
