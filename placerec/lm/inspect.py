@@ -71,7 +71,7 @@ def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:
     history = history[max(0, len(history) - model.order + 1) :]
     tables, ids = model.tables, model.ids([*history, word])
     digits = tables.digits(ids)
-    contexts = Contexts(tables, digits, np.zeros(1, np.int64))
+    contexts = Contexts(tables, digits, 0)
     log10_p, answered = tables.find(contexts, digits)
     found = int(answered[-1])
     steps: list[dict[str, Any]] = []

@@ -49,7 +49,7 @@ class RowIndex:
         slot, place = self._hashed(wanted)
         # No slot is out of range: nothing to check, nothing to wrap.
         place ^= self._slots.take(slot, mode="wrap")
-        missed = np.flatnonzero(place >= self._size)
+        missed = (place >= self._size).nonzero()[0]
         found = place.view(np.int64)
         found[missed] = -1
         if self._rest is not None and len(missed := missed[self._contested[slot[missed]]]):

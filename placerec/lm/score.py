@@ -85,7 +85,7 @@ class Table(NamedTuple):
         missing = row < 0
         if self.listed is not None:
             missing |= ~self.listed.take(row, mode="wrap")
-        return np.flatnonzero(missing)
+        return missing.nonzero()[0]
 
     def stems(self, codes: Ints) -> Ints:
         """What codes of the next order begin with, for n-grams of these codes (T,)."""
@@ -98,7 +98,7 @@ class Contexts:
     `digits` (T,) of the words; sequences begin at `starts`.
     """
 
-    def __init__(self, tables: "ScoreTables", digits: Ints, starts: Ints) -> None:
+    def __init__(self, tables: "ScoreTables", digits: Ints, starts: Ints | int) -> None:
         nothing = np.zeros(len(digits), np.int64)
         self.codes, self.stems, self._tables = [nothing], [nothing], tables.tables[:-1]
         for table in self._tables:
@@ -156,12 +156,14 @@ class ScoreTables:
         left, paid = table.unanswered(best), []
         best += table.start
         for k in range(n - 1, 0, -1):
+            if not len(left):
+                break
             table = self.tables[k - 1]
             # What may answer now, and the contexts that did not help before: both have k words.
             shorter = contexts.stems[k - 1][left] * base + digits[left]
             row = table.rows.find(np.concatenate([shorter, contexts.codes[k][left]]))
             row, context = row[: len(left)], row[len(left) :]
-            known = np.flatnonzero(context >= 0)
+            known = (context >= 0).nonzero()[0]
             paid.append((left[known], table.backoff.take(context[known], axis=0)))
             best[left], answered[left] = row + table.start, k
             left = left[table.unanswered(row)]
@@ -182,7 +184,7 @@ class ScoreTables:
         for start in range(0, len(ids), CHUNK):
             before = max(0, start - len(self.tables) + 1)
             digits = self.digits(ids[before : start + CHUNK])
-            contexts = Contexts(self, digits, np.zeros(1, np.int64))
+            contexts = Contexts(self, digits, 0)
             scores[start : start + CHUNK] = self.find(contexts, digits)[0][start - before :]
         return scores
 
