@@ -201,7 +201,10 @@ class Fitter:
         return True
 
     def prepare_late(self) -> list[int]:
-        """Change the counts of the orders whose parameters were read, as SRILM does during estimation; returns the orders."""
+        """Change counts for the orders whose parameters were read, and return these orders.
+
+        SRILM does it when estimation comes to them.
+        """
         return [n for n in sorted(self.late) if self.prepare(n, silent=True)]
 
     def _read(self, choice: Choice) -> Rule:
