@@ -1,4 +1,4 @@
-"""Work on other machines: a map of `jobs` on a Dask cluster (https://distributed.dask.org).
+"""Work on other machines: an executor as `jobs` has them, on a Dask cluster (https://distributed.dask.org).
 
 An item is sent with the task that needs it, so that the scheduler hands out again what a lost worker had; what is
 kept for several functions lies with the workers, and is sent again if its worker is lost.
@@ -51,7 +51,7 @@ def check_address(address: str) -> None:
 
 @contextmanager
 def cluster(address: str) -> Iterator[RemoteExecutor]:
-    """A map whose workers are those of the scheduler at `address`, or N processes of this machine (`local:N`).
+    """An executor whose workers are those of the scheduler at `address`, or N processes of this machine (`local:N`).
 
     Functions and items must be importable and picklable; the function is sent once; what it logs is logged here, in the
     order of the items. Some items more than there are threads are asked for ahead of the results. Workers may come and
@@ -159,7 +159,7 @@ def _check_workers(client: Any, address: str) -> None:
 
 
 def _versions() -> dict[str, str]:
-    """What decides on the bytes."""
+    """The versions and the kind of processor that decide on the bytes of results."""
     packages = {name: metadata.version(name) for name in ("numpy", "scipy")}
     return {"placerec": __version__, **packages, "processor": platform.machine()}
 
@@ -179,7 +179,7 @@ class _Function:
     version: str
 
     def here(self) -> Callable[..., Any]:
-        """On a worker, perhaps one that came later than the map."""
+        """The function, for a worker of any age; JobError on one of another version of placerec."""
         if self.version != __version__:
             raise JobError(f"a worker has placerec {__version__}, and {self.version} is wanted; {_SAME}")
         return self.function.item
@@ -205,16 +205,16 @@ class _Dask:
             yield answer.replay()
 
     def keep(self, items: Numbered[T], /) -> ScatteredMap[T]:
-        """Maps functions over items that lie with the workers; `items` gives them again when a worker is lost."""
+        """Maps functions over `items`, which are sent to the workers once, and again where a worker is lost."""
         size = max(1, min(KEPT, len(items) // (4 * max(1, self._threads()))))
         groups = [range(first, min(first + size, len(items))) for first in range(0, len(items), size)]
         places: list[Any] = [None] * len(groups)
 
         def place(group: int, lost: bool) -> Any:
             if lost or places[group] is None:
-                its = _Item([items[i] for i in groups[group]])
+                together = _Item([items[i] for i in groups[group]])
                 with self._reached():
-                    places[group] = self._client.scatter([its], hash=False)[0]
+                    places[group] = self._client.scatter([together], hash=False)[0]
             return places[group]
 
         def each(function: Callable[[T], R], /) -> Iterator[R]:
@@ -226,7 +226,7 @@ class _Dask:
         return each
 
     def _submitter(self, call: Callable[..., Any], function: Callable[..., Any]) -> Callable[[Any], Any]:
-        """What submits `call` of the function and something else; the function is with the scheduler."""
+        """A function that submits `call(function, item)` for an item; `function` is sent to the scheduler once."""
         # Under the function's name the scheduler remembers how long its tasks take.
         name = f"{getattr(getattr(function, 'func', function), '__name__', 'work').strip('_')}-{uuid4().hex}"
         known = self._client.submit(_Function, _Item(function), __version__, key=f"{name}-function")
@@ -239,7 +239,7 @@ class _Dask:
         return look_ahead(lambda task: (task, task(False)), self._result, tasks, ahead, at_end=self._cancel)
 
     def _cancel(self, submitted: Iterable[tuple[Task, Any]]) -> None:
-        """No word of it if the scheduler is gone."""
+        """Take back tasks that nobody waits for; nothing is said if the scheduler is gone."""
         waiting = [future for _, future in submitted]
         if waiting and self._client.status == "running":
             with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Work in several threads or processes: the same results in the same order, and the same notes."""
+"""A function mapped over items in threads or processes: results and log records come in the order of the items."""
 
 import logging
 import multiprocessing
@@ -39,7 +39,7 @@ def silent(label: str) -> AbstractContextManager[Progress]:
 
 
 class JobError(PlacerecError):
-    """A process of the work came to its end before the work did."""
+    """A worker, or a cluster, that is not there or ended before its work did."""
 
 
 class Executor(Protocol):
@@ -49,7 +49,7 @@ class Executor(Protocol):
 
 
 class Numbered(Protocol[T_co]):
-    """Items by number: a sequence, as far as a cluster needs it."""
+    """A sequence as far as a cluster needs one: its length, and an item by its number."""
 
     def __len__(self) -> int: ...
 
@@ -57,7 +57,7 @@ class Numbered(Protocol[T_co]):
 
 
 class ScatteredMap(Protocol[T_co]):
-    """A map of one function after the other over the same items."""
+    """Maps functions, one after the other, over items that were handed out before."""
 
     def __call__(self, function: Callable[[T_co], R], /) -> Iterator[R]: ...
 
@@ -90,7 +90,7 @@ def processors() -> int:
 
 
 def workers(jobs: int | None = None) -> Executor:
-    """What maps a function in `jobs` processes (MOST at most); 1: in this one; None: in its threads, one a processor.
+    """An executor of `jobs` processes (MOST at most); 1: this process; None: threads of this process, one a processor.
 
     Functions and items of processes must be importable and picklable; the function goes to each process once, and what
     it logs is logged here, in the order of the items. Only some items ahead of the results are asked for. An
