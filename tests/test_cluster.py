@@ -14,9 +14,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
-from helpers.local_dask import ENVIRONMENT, LocalDask, local_dask, wait_until
+from helpers.local_dask import ENVIRONMENT, LocalDask, local_dask
 from helpers.small_world import write_images, write_tokens
 from helpers.typed_commands import done, placerec
+from helpers.waiting import wait_until
 
 from placerec import cluster as room
 from placerec.cluster import check_address, cluster

@@ -7,9 +7,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Generator, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
+from helpers.waiting import wait_until
 
 from placerec.errors import MissingExtraError, PlacerecError, StreamError
 from placerec.jobs import FEW, map_jobs, processors, workers
@@ -90,20 +92,13 @@ def test_workers_end_with_their_parent(tmp_path: Path) -> None:
         f"if __name__ == '__main__':\n    map_jobs(wait, {paths!r}, jobs=2)\n"
     )
     with subprocess.Popen([sys.executable, str(program)]) as parent:
-        workers = [_number_in(Path(path)) for path in paths]
+        workers = [wait_until(partial(_number_in, Path(path)), "the worker never began") for path in paths]
         parent.kill()
-    until = time.monotonic() + 20
-    while any(map(_runs, workers)):
-        assert time.monotonic() < until, "a worker outlived its parent"
-        time.sleep(0.05)
+    wait_until(lambda: not any(map(_runs, workers)), "a worker outlived its parent")
 
 
-def _number_in(path: Path) -> int:
-    until = time.monotonic() + 30
-    while not path.exists() or not path.read_text():
-        assert time.monotonic() < until, "the worker never began"
-        time.sleep(0.05)
-    return int(path.read_text())
+def _number_in(path: Path) -> int | None:
+    return int(path.read_text() or 0) if path.exists() else None
 
 
 def _runs(pid: int) -> bool:

@@ -5,15 +5,13 @@ import json
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
 
 import placerec
+from helpers.waiting import wait_until
 
-T = TypeVar("T")
 ENVIRONMENT = {
     **os.environ,
     # As `dask worker` has it, which begins without its own supervisor here.
@@ -72,15 +70,6 @@ def local_dask(folder: Path) -> Iterator[LocalDask]:
         yield machines
     finally:
         machines.close()
-
-
-def wait_until(found: Callable[[], T | None], complaint: str) -> T:
-    """What `found` gives, once that is true."""
-    until = time.monotonic() + 60
-    while not (result := found()):
-        assert time.monotonic() < until, complaint
-        time.sleep(0.05)
-    return result
 
 
 def _address(file: Path) -> str | None:
