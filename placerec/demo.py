@@ -2,8 +2,7 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -30,22 +29,18 @@ from placerec.words.tokenize import tokens_of
 
 SMOOTHINGS = ("witten-bell", "lidstone")
 ORDERS = (1, 2)
+BEST = ("witten-bell", 2)
 # The paper's protocol: the first two runs of each condition train, the third tests.
 TEST_RUN = "3"
 OWNED = ("lab", "words.npz", "tokens", "models", "beliefs", "*.png", "report.html")
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class DemoResult:
-    """One way of making models, and how the test sequences were recognised with it."""
-
-    smoothing: str
-    order: int
-    evaluation: Evaluation
+# Smoothing and order of the models, and how the test sequences were recognised with them.
+DemoResults = dict[tuple[str, int], Evaluation]
 
 
-def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: ProgressBar) -> list[DemoResult]:
+def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: ProgressBar) -> DemoResults:
     """`placerec demo`: render the laboratory, learn words and models, recognise the test runs, write the folder `out`.
 
     `progress(label)` is a context manager that gives a callback(done, total). Returns a result per smoothing and order.
@@ -67,17 +62,12 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
         dictionary.save(folder / "words.npz")
         write_tokens(tokens_of(descriptors, dictionary), dictionary, folder / "tokens")
         log.info("Training language models and recognising run 3")
-        results: list[DemoResult] = []
-        best: list[Beliefs] = []
-        for smoothing in SMOOTHINGS:
-            for order in ORDERS:
-                beliefs = _recognise(folder, smoothing, order)
-                results.append(DemoResult(smoothing, order, evaluate(beliefs)))
-                best = beliefs if (smoothing, order) == ("witten-bell", 2) else best
+        beliefs = {way: _recognise(folder, *way) for way in product(SMOOTHINGS, ORDERS)}
+        results = {way: evaluate(found) for way, found in beliefs.items()}
         _contact_sheet(_typical_frames(sequences), folder / "laboratory.png")
         words = word_table(descriptors.take(~training), dictionary)
         draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title="The words of run 3")
-        plot_evaluation(best, evaluate(best), folder / "beliefs.png")
+        plot_evaluation(beliefs[BEST], results[BEST], folder / "beliefs.png")
         write_text(
             folder / "report.html", _report(folder, results, words, len(descriptors.frames), _commands(scale, seed))
         )
@@ -98,14 +88,17 @@ def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
     return beliefs
 
 
-def format_results(results: Sequence[DemoResult]) -> str:
+def format_results(results: DemoResults) -> str:
     """The results as a table for the terminal."""
-    majority = results[0].evaluation
+    majority = results[BEST]
     lines = [
         f"Synthetic laboratory, {majority.frames} test frames of {len(majority.sequences)} sequences: frames right",
         f"  {majority.majority_accuracy:6.1%}  always {majority.majority_place} (the majority class)",
     ]
-    lines += [f"  {r.evaluation.accuracy:6.1%}  {r.smoothing}, n = {r.order}{_note(r.order)}" for r in results]
+    lines += [
+        f"  {found.accuracy:6.1%}  {smoothing}, n = {order}{_note(order)}"
+        for (smoothing, order), found in results.items()
+    ]
     return "\n".join(lines)
 
 
@@ -145,7 +138,7 @@ def _contact_sheet(images: Mapping[str, Mapping[str, Path]], path: Path) -> None
             axes.set_title(column)
 
 
-def _report(folder: Path, results: Sequence[DemoResult], words: WordTable, frames: int, commands: str) -> str:
+def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, commands: str) -> str:
     body = [
         paragraph(
             f"A camera was driven through a small office laboratory: {frames} frames in 18 sequences. The laboratory "
@@ -182,16 +175,15 @@ def _report(folder: Path, results: Sequence[DemoResult], words: WordTable, frame
     return html_page("placerec: which place is the camera in?", body)
 
 
-def _results_table(results: Sequence[DemoResult]) -> str:
-    majority = results[0].evaluation
+def _results_table(results: DemoResults) -> str:
+    majority = results[BEST]
     rows: list[Sequence[object]] = [
         (f"always {majority.majority_place} (majority class)", None, f"{majority.majority_accuracy:.1%}", None, None)
     ]
-    for result in results:
-        found = result.evaluation
+    for (smoothing, order), found in results.items():
         latency = None if found.change_latency_frames is None else f"{found.change_latency_frames:g}"
-        name = f"{result.smoothing}{_note(result.order)}"
-        rows.append((name, result.order, f"{found.accuracy:.1%}", f"{found.balanced_accuracy:.1%}", latency))
+        name = f"{smoothing}{_note(order)}"
+        rows.append((name, order, f"{found.accuracy:.1%}", f"{found.balanced_accuracy:.1%}", latency))
     return table(
         ("Models", "n", "Frames right", "Mean recall of places", "Frames until right after a change (median)"),
         rows,

@@ -16,6 +16,12 @@ _SMALLEST_BELIEF = 1e-15
 
 _UNLABELLED = -1
 
+# What the JSON object of an evaluation begins with.
+_NUMBERS = (
+    *("frames", "unlabelled", "accuracy", "balanced_accuracy", "majority_accuracy", "majority_place"),
+    *("change_latency_frames", "changes", "ece", "log_loss"),
+)
+
 
 @dataclass(frozen=True)
 class PlaceScore:
@@ -63,32 +69,19 @@ class Evaluation:
 
     def to_json(self) -> dict[str, object]:
         """The object that `evaluate --json` prints: plain Python values, None where a number is undefined."""
-        counts = self.confusion.tolist()
+        counts, new = self.confusion.tolist(), self.new_places
+        unknown = {} if new is None else {"unknown_auroc": new.auroc, "unknown_frames": new.new}
         return {
-            "frames": self.frames,
-            "unlabelled": self.unlabelled,
-            "accuracy": self.accuracy,
-            "balanced_accuracy": self.balanced_accuracy,
-            "majority_accuracy": self.majority_accuracy,
-            "majority_place": self.majority_place,
-            "change_latency_frames": self.change_latency_frames,
-            "changes": self.changes,
-            "ece": self.ece,
-            "log_loss": self.log_loss,
+            **{name: getattr(self, name) for name in _NUMBERS},
             "reliability": self.reliability.to_json(),
             "risk_coverage": self.risk_coverage.to_json(),
-            **self._new_places_to_json(),
+            **unknown,
             "per_place": {name: dict(vars(score)) for name, score in self.per_place.items()},
             "confusion": {
                 name: dict(zip(self.places, row, strict=True)) for name, row in zip(self.places, counts, strict=True)
             },
             "sequences": {name: dict(vars(score)) for name, score in self.sequences.items()},
         }
-
-    def _new_places_to_json(self) -> dict[str, object]:
-        if self.new_places is None:
-            return {}
-        return {"unknown_auroc": self.new_places.auroc, "unknown_frames": self.new_places.new}
 
 
 def evaluate(beliefs: Sequence[Beliefs]) -> Evaluation:
@@ -99,8 +92,7 @@ def evaluate(beliefs: Sequence[Beliefs]) -> Evaluation:
     those in all places and `unknown` together. Raises EvaluationError if two sequences have the same name or no frame
     has a label.
     """
-    _refuse_twins(beliefs)
-    _refuse_unlabelled(beliefs)
+    _check(beliefs)
     places = place_order(beliefs)
     truths = [one.stream.table.places.codes(places) for one in beliefs]
     rights = [right_frames(one) for one in beliefs]
@@ -171,15 +163,12 @@ def change_latencies(truth: Ints, right: Mask) -> Ints:
     return latencies
 
 
-def _refuse_twins(beliefs: Sequence[Beliefs]) -> None:
+def _check(beliefs: Sequence[Beliefs]) -> None:
     seen = set()
     for sequence in beliefs:
         if sequence.name in seen:
             raise EvaluationError(f"two sequences are called {sequence.name!r}; rename one file or leave it out")
         seen.add(sequence.name)
-
-
-def _refuse_unlabelled(beliefs: Sequence[Beliefs]) -> None:
     if any(any(sequence.truth) for sequence in beliefs):
         return
     names = ", ".join(sequence.name for sequence in beliefs[:3]) + (", ..." if len(beliefs) > 3 else "")

@@ -99,7 +99,10 @@ def _address(image: Path | str | bytes) -> str:
         data = image if isinstance(image, bytes) else Path(image).read_bytes()
     except OSError as error:
         raise EvaluationError(f"{source}: cannot be read: {error.strerror}") from error
-    return f"data:{_kind(data, source)};base64,{base64.b64encode(data).decode('ascii')}"
+    kind = next((kind for magic, kind in _KINDS if data.startswith(magic)), "")
+    if not kind and b"<svg" not in data[:1000]:
+        raise EvaluationError(f"{source}: neither PNG, JPEG nor SVG; pages hold no other pictures")
+    return f"data:{kind or 'image/svg+xml'};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]], caption: str) -> str:
@@ -128,12 +131,3 @@ def _row(cells: Sequence[object], flush: Sequence[bool], tag: str) -> str:
 def _numeric(cell: object) -> bool:
     """Also `87.3 %` and `12 ms`: what starts like a number is compared like one."""
     return cell is None or isinstance(cell, int | float) or str(cell).lstrip("+-−±~<> ")[:1].isdigit()
-
-
-def _kind(data: bytes, source: str) -> str:
-    for magic, kind in _KINDS:
-        if data.startswith(magic):
-            return kind
-    if b"<svg" in data[:1000]:
-        return "image/svg+xml"
-    raise EvaluationError(f"{source}: neither PNG, JPEG nor SVG; pages hold no other pictures")

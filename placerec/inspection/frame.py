@@ -54,7 +54,7 @@ class FrameView:
     unit: int
     distances: Floats
     nearest: tuple[int, ...]
-    table: WordTable | None
+    table: WordTable | None = None
 
     def to_json(self) -> dict[str, object]:
         """The object that `show-frame --json` prints."""
@@ -97,7 +97,7 @@ def show_frame(
     return view
 
 
-def view_frame(image: Path | str, dictionary: Dictionary, table: WordTable | None = None) -> FrameView:
+def view_frame(image: Path | str, dictionary: Dictionary) -> FrameView:
     """Look at one image file with a dictionary. Raises SourceError or VisionError for one that cannot be used."""
     spec = dictionary.spec
     gray = read_gray(Path(image))
@@ -116,7 +116,6 @@ def view_frame(image: Path | str, dictionary: Dictionary, table: WordTable | Non
         unit,
         distances,
         tuple(nearest if unit in nearest else [*nearest, unit]),
-        table,
     )
 
 

@@ -1,7 +1,7 @@
 """How stable words are: the share of frames that get another word when a camera's small faults are added to them."""
 
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, groupby
@@ -43,37 +43,42 @@ class Change:
 
 @dataclass(frozen=True)
 class ChangeResult:
-    """How many frames got another word by a change, and how many of these the word of a unit next to it (of 8)."""
+    """How many frames got another word by a change, and how many of these the word of a unit next to it (of 8).
+
+    Also of pairs of consecutive frames, which tell how much words change anyway.
+    """
 
     kind: str
     amount: str
+    frames: int
     changed: int
     neighbour: int
+
+    def shares(self) -> dict[str, float | None]:
+        """The shares of 1 of those that changed, None where there are no frames."""
+        counts = {"changed": self.changed, "to_neighbour": self.neighbour}
+        return {name: count / self.frames if self.frames else None for name, count in counts.items()}
 
 
 @dataclass(frozen=True)
 class Stability:
-    """The result for every change, over `frames` frames.
-
-    `steps`, `step_changed`, `step_neighbour`: pairs of consecutive frames, and the same counts for them: how much
-    words change anyway.
-    """
+    """The result for every change, over `frames` frames, and for the step from a frame to the next."""
 
     frames: int
     results: tuple[ChangeResult, ...]
-    steps: int
-    step_changed: int
-    step_neighbour: int
+    step: ChangeResult
+
+    @property
+    def shown(self) -> list[ChangeResult]:
+        """The results that there are: that for a step only where there are two frames in a row."""
+        return [*self.results, *([self.step] if self.step.frames else [])]
 
     def to_json(self) -> dict[str, object]:
         """The object that `stability --json` prints; shares are of 1, None where there are no two frames in a row."""
         return {
             "frames": self.frames,
-            "changes": [
-                {"kind": r.kind, "amount": r.amount, **_shares(r.changed, r.neighbour, self.frames)}
-                for r in self.results
-            ],
-            "next_frame": {"steps": self.steps, **_shares(self.step_changed, self.step_neighbour, self.steps)},
+            "changes": [{"kind": one.kind, "amount": one.amount, **one.shares()} for one in self.results],
+            "next_frame": {"steps": self.step.frames, **self.step.shares()},
         }
 
 
@@ -133,21 +138,15 @@ def word_changes(
 
 def _compared(words: Ints, follows: Mask, size: int) -> Stability:
     """words (n, 1 + changes), the unchanged first; follows (n - 1,): whether the next row is of the same sequence."""
-    results = []
-    for column, change in enumerate(CHANGES, start=1):
-        results.append(ChangeResult(change.kind, change.amount, *_count(words[:, 0], words[:, column], size)))
-    step = _count(words[:-1, 0][follows], words[1:, 0][follows], size)
-    return Stability(len(words), tuple(results), int(follows.sum()), *step)
 
+    def compared(kind: str, amount: str, before: Ints, after: Ints) -> ChangeResult:
+        # Next to each other on the map, corners included.
+        apart = np.maximum(np.abs(before // size - after // size), np.abs(before % size - after % size))
+        return ChangeResult(kind, amount, len(before), int((apart > 0).sum()), int((apart == 1).sum()))
 
-def _count(before: Ints, after: Ints, size: int) -> tuple[int, int]:
-    """How many units differ, and how many of these are next to each other on the map, corners included."""
-    apart = np.maximum(np.abs(before // size - after // size), np.abs(before % size - after % size))
-    return int((apart > 0).sum()), int((apart == 1).sum())
-
-
-def _shares(changed: int, neighbour: int, of: int) -> dict[str, float | None]:
-    return {"changed": changed / of if of else None, "to_neighbour": neighbour / of if of else None}
+    changed = zip(CHANGES, words[:, 1:].T, strict=True)
+    results = tuple(compared(change.kind, change.amount, words[:, 0], after) for change, after in changed)
+    return Stability(len(words), results, compared(_NEXT, "", words[:-1, 0][follows], words[1:, 0][follows]))
 
 
 def _described(frame: Frame, gray: Gray | str, spec: DescriptorSpec, rng: np.random.Generator) -> Singles | None:
@@ -156,15 +155,10 @@ def _described(frame: Frame, gray: Gray | str, spec: DescriptorSpec, rng: np.ran
         log.warning("%s; the frame is skipped", gray)
         return None
     try:
-        return np.stack([descriptor(gray, spec), *(descriptor(each, spec) for each in _changed(gray, spec, rng))])
+        return np.stack([descriptor(gray, spec), *(descriptor(each.apply(gray, spec, rng), spec) for each in CHANGES)])
     except VisionError as error:
         log.warning("%s: frame %s: %s; the frame is skipped", frame.path, frame.name, error)
     return None
-
-
-def _changed(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator) -> Iterator[Gray]:
-    for change in CHANGES:
-        yield change.apply(gray, spec, rng)
 
 
 def _like(values: NDArray[Any], gray: Gray) -> Gray:
@@ -218,10 +212,10 @@ CHANGES = (
     *(Change("noise", f"sigma {s}", partial(_noise, sigma=s)) for s in (2, 5, 10)),
     *(Change("brightness", f"{p:+d} %", partial(_brightness, factor=1 + p / 100)) for p in (-30, -10, 10, 30)),
     *(Change("blur", f"sigma {s}", partial(_blur, sigma=s)) for s in (1, 2)),
-    Change("shift by 1 pixel", "left", partial(_shift, right=-1, down=0)),
-    Change("shift by 1 pixel", "right", partial(_shift, right=1, down=0)),
-    Change("shift by 1 pixel", "up", partial(_shift, right=0, down=-1)),
-    Change("shift by 1 pixel", "down", partial(_shift, right=0, down=1)),
+    *(
+        Change("shift by 1 pixel", way, partial(_shift, right=right, down=down))
+        for way, right, down in (("left", -1, 0), ("right", 1, 0), ("up", 0, -1), ("down", 0, 1))
+    ),
     Change("resize filter", "nearest", partial(_resized, interpolation=cv2.INTER_NEAREST)),
     Change("resize filter", "bicubic", partial(_resized, interpolation=cv2.INTER_CUBIC)),
 )
@@ -230,9 +224,9 @@ CHANGES = (
 def format_stability(found: Stability) -> str:
     """A line per change: the share of frames whose word changes, and of these the share that stays next to it."""
     lines = [f"Of {found.frames} frames", f"{'':<32}{'other word':>11}{'a neighbour':>13}{'farther':>9}"]
-    for kind, amount, changed, neighbour, frames in _rows(found):
-        shares = [percent(count / frames) for count in (changed, neighbour, changed - neighbour)]
-        lines.append(f"{f'{kind} {amount}'.strip():<32}{shares[0]:>11}{shares[1]:>13}{shares[2]:>9}")
+    for one in found.shown:
+        shares = [percent(count / one.frames) for count in (one.changed, one.neighbour, one.changed - one.neighbour)]
+        lines.append(f"{f'{one.kind} {one.amount}'.strip():<32}{shares[0]:>11}{shares[1]:>13}{shares[2]:>9}")
     return "\n".join(lines)
 
 
@@ -241,13 +235,13 @@ def plot_stability(found: Stability, path: Path | str) -> None:
 
     Raises OutputError for another suffix or a path that cannot be written, MissingExtraError without matplotlib.
     """
-    rows = _rows(found)
-    groups = [list(group) for _, group in groupby(rows, key=lambda row: row[0])]
+    rows = found.shown
+    groups = [list(group) for _, group in groupby(rows, key=lambda row: row.kind)]
     # Half a row of space between the kinds of change.
     tops = np.concatenate([np.arange(len(group)) for group in groups])
     tops = tops + np.repeat(np.cumsum([0, *(len(group) + 0.5 for group in groups[:-1])]), [len(g) for g in groups])
-    near = np.array([100 * neighbour / frames for _, _, _, neighbour, frames in rows])
-    far = np.array([100 * (changed - neighbour) / frames for _, _, changed, neighbour, frames in rows])
+    near = np.array([100 * one.neighbour / one.frames for one in rows])
+    far = np.array([100 * (one.changed - one.neighbour) / one.frames for one in rows])
     height = 1.6 + 0.26 * float(tops[-1] + 1)
     with figure_file(path, 9.0, height) as figure:
         axes = figure.add_axes((0.27, 0.6 / height, 0.68, 1 - 1.45 / height))
@@ -255,7 +249,7 @@ def plot_stability(found: Stability, path: Path | str) -> None:
         axes.barh(tops, near, left=far, color=_NEAR, height=0.8, label="to one of the 8 neighbours of its unit")
         for top, share in zip(tops, near + far, strict=True):
             axes.text(share + 0.6, top, f"{share:.1f}", va="center", fontsize=8)
-        names = [f"{kind} {amount}".strip() for kind, amount, *_ in rows]
+        names = [f"{one.kind} {one.amount}".strip() for one in rows]
         axes.set_yticks(tops, labels=names, fontsize=8.5)
         axes.tick_params(axis="y", length=0)
         axes.tick_params(axis="x", labelsize=8)
@@ -264,11 +258,3 @@ def plot_stability(found: Stability, path: Path | str) -> None:
         axes.set_xlabel("frames whose word changes, %", fontsize=8.5)
         figure.text(0.02, 1 - 0.4 / height, f"How stable the words of {found.frames} frames are", fontsize=14)
         figure.legend(loc="upper left", bbox_to_anchor=(0.01, 1 - 0.5 / height), ncols=2, frameon=False, fontsize=8.5)
-
-
-def _rows(found: Stability) -> list[tuple[str, str, int, int, int]]:
-    """Kind, amount, words that change, those that change to a neighbour, of how many frames."""
-    rows = [(r.kind, r.amount, r.changed, r.neighbour, found.frames) for r in found.results]
-    if found.steps:
-        rows.append((_NEXT, "", found.step_changed, found.step_neighbour, found.steps))
-    return rows

@@ -58,12 +58,12 @@ def test_the_counts_are_those_of_a_plain_loop(world: World) -> None:
         apart = [max(abs(a // 4 - b // 4), abs(a % 4 - b % 4)) for a, b in pairs]
         return sum(distance > 0 for distance in apart), sum(distance == 1 for distance in apart)
 
-    assert (found.frames, found.steps) == (20, 18)
+    assert (found.frames, found.step.frames) == (20, 18)
     for column, result in enumerate(found.results, start=1):
         assert (result.kind, result.amount) == (CHANGES[column - 1].kind, CHANGES[column - 1].amount)
         assert (result.changed, result.neighbour) == counts([(row[0], row[column]) for row in words])
     steps = [(words[i][0], words[i + 1][0]) for i in range(19) if i != 9]
-    assert (found.step_changed, found.step_neighbour) == counts(steps)
+    assert (found.step.changed, found.step.neighbour) == counts(steps)
     assert sum(result.changed for result in found.results) > 0
 
 
@@ -93,7 +93,7 @@ def test_an_image_that_cannot_be_read_is_skipped_and_named(
 
 
 def test_json_has_shares() -> None:
-    found = Stability(4, (ChangeResult("noise", "sigma 2", 2, 1),), 0, 0, 0)
+    found = Stability(4, (ChangeResult("noise", "sigma 2", 4, 2, 1),), ChangeResult("next", "", 0, 0, 0))
     assert found.to_json() == {
         "frames": 4,
         "changes": [{"kind": "noise", "amount": "sigma 2", "changed": 0.5, "to_neighbour": 0.25}],
