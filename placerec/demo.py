@@ -124,13 +124,11 @@ def _contact_sheet(images: Mapping[str, Mapping[str, Path]], path: Path) -> None
     Raises MissingExtraError without matplotlib, SourceError for an image that cannot be read.
     """
     columns = sorted({column for row in images.values() for column in row})
-    with figure_file(path, width=2.1 * len(columns) + 0.3, height=1.6 * len(images) + 0.3) as figure:
-        figure.set_layout_engine("compressed")
+    with figure_file(path, 2.1 * len(columns) + 0.3, 1.6 * len(images) + 0.3, "compressed") as figure:
         grid = figure.subplots(len(images), len(columns), squeeze=False)
         for (row, pictures), axes_row in zip(images.items(), grid, strict=True):
             for column, axes in zip(columns, axes_row, strict=True):
-                axes.set_xticks([])
-                axes.set_yticks([])
+                axes.set(xticks=[], yticks=[])
                 if column in pictures:
                     axes.imshow(read_gray(pictures[column]), cmap="gray", vmin=0, vmax=255)
             axes_row[0].set_ylabel(row)

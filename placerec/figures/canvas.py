@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_Layout = Literal["constrained", "compressed"]
 _LOG = logging.getLogger(__name__)
 
 # Dates and versions would make two pictures of the same numbers differ.
@@ -42,11 +43,12 @@ MARGIN = 0.3
 
 
 @contextmanager
-def figure_file(path: Path | str, width: float, height: float) -> "Iterator[Figure]":
+def figure_file(path: Path | str, width: float, height: float, layout: _Layout | None = None) -> "Iterator[Figure]":
     """An empty figure of this size in inches, written to `path` (PNG, SVG or PDF by suffix) when the block ends.
 
-    What is drawn in the block depends on nothing of the user's matplotlib settings. Raises OutputError for another
-    suffix or a path that cannot be written, MissingExtraError without matplotlib.
+    `layout`: None where the places of all axes are given. What is drawn in the block depends on nothing of the user's
+    matplotlib settings. Raises OutputError for another suffix or a path that cannot be written, MissingExtraError
+    without matplotlib.
     """
     path = Path(path)
     check_figure(path)
@@ -59,7 +61,7 @@ def figure_file(path: Path | str, width: float, height: float) -> "Iterator[Figu
         matplotlib.rcParams["svg.hashsalt"] = "placerec"
         # A place may be called `a$b$`.
         matplotlib.rcParams["text.parse_math"] = False
-        figure = Figure(figsize=(width, height))
+        figure = Figure(figsize=(width, height), layout=layout)
         FigureCanvasAgg(figure)
         yield figure
         with whole_file(path) as partial, _logged_warnings():

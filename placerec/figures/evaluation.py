@@ -20,7 +20,6 @@ from placerec.figures.panels import (
     legend_panel,
     reliability_panel,
     roc_panel,
-    strip_title,
 )
 from placerec.frames.naming import unique_names
 from placerec.hohmm.beliefs import Beliefs, parse_beliefs, read_beliefs
@@ -77,11 +76,13 @@ def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Pa
     step = strip + 0.42
     height = _HEAD + max(step * len(shown) + 0.15, side)
     with figure_file(path, _WIDTH, height) as figure:
-        _head(figure, evaluation, _selection_note(len(shown), len(beliefs)))
+        _head(figure, evaluation)
+        reading = "Each strip is one sequence; the belief in each place is the height of its colour."
+        some = f" {len(shown)} of {len(beliefs)} sequences: the best, the worst and evenly many between by accuracy."
+        write_line(figure, 0.86, reading + some * (len(shown) < len(beliefs)), 8, "0.4")
         for number, sequence in enumerate(shown):
             axes = panel(figure, _STRIP_LEFT, _HEAD + 0.1 + step * number, _STRIP_WIDTH, strip)
-            title = strip_title(sequence.name, evaluation.sequences[sequence.name].accuracy)
-            belief_strip(axes, sequence, places=evaluation.places, title=title)
+            belief_strip(axes, sequence, evaluation)
         axes.set_xlabel("frame", fontsize=7, labelpad=1)
         legend_panel(panel(figure, _SIDE_LEFT, _HEAD, _WIDTH - MARGIN - _SIDE_LEFT, legend), evaluation.places)
         confusion_panel(panel(figure, _MATRIX_LEFT, _HEAD + legend + 0.5, matrix, matrix), evaluation)
@@ -111,7 +112,7 @@ def chosen(beliefs: Sequence[Beliefs], evaluation: Evaluation, most: int = MOST_
     return [beliefs[index] for index in sorted(ranked[pick] for pick in picked)]
 
 
-def _head(figure: "Figure", evaluation: Evaluation, note: str) -> None:
+def _head(figure: "Figure", evaluation: Evaluation) -> None:
     majority = f"always “{shorten(evaluation.majority_place, 40)}”: {percent(evaluation.majority_accuracy)}"
     latency = evaluation.change_latency_frames
     numbers = [
@@ -124,14 +125,6 @@ def _head(figure: "Figure", evaluation: Evaluation, note: str) -> None:
     ]
     write_line(figure, 0.38, f"Accuracy {percent(evaluation.accuracy)}   (majority class, {majority})", 15)
     write_line(figure, 0.64, "  ·  ".join(numbers), 9, "0.25")
-    write_line(figure, 0.86, note, 8, "0.4")
-
-
-def _selection_note(shown: int, all_of_them: int) -> str:
-    reading = "Each strip is one sequence; the belief in each place is the height of its colour."
-    if shown == all_of_them:
-        return reading
-    return f"{reading} {shown} of {all_of_them} sequences: the best, the worst and evenly many between by accuracy."
 
 
 def _files(sources: list[Path]) -> list[Path]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints
 from placerec.evaluation.confidence import COVERAGES, ECE_BINS, NewPlaces, Reliability, RiskCoverage
-from placerec.evaluation.metrics import Evaluation, place_order, right_frames
+from placerec.evaluation.metrics import Evaluation, right_frames
 from placerec.evaluation.summary import percent, shorten
 from placerec.figures.canvas import BLACK, WHITE, letter_colour, place_colours
 from placerec.frames.table import Labels
@@ -29,15 +29,14 @@ _LETTER = 0.66
 _BLUE, _GREY = "#4a90c2", "0.55"
 
 
-def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None = None, title: str = "") -> None:
+def belief_strip(axes: "Axes", beliefs: Beliefs, evaluation: Evaluation) -> None:
     """Draw one sequence: true places on top, the beliefs stacked to 1, decided places below, black where wrong.
 
-    With a column `unknown` its share comes on top of the places', which are drawn as much lower.
-
-    places: all places of the picture, in the order of their colours; by default the sequence's own. Of a long
-    sequence evenly spaced frames are drawn.
+    With a column `unknown` its share comes on top of the places', which are drawn as much lower. Of a long sequence
+    evenly spaced frames are drawn. `evaluation`: of all sequences of the picture, which give the places their colours.
     """
-    places = place_order([beliefs]) if places is None else places
+    places, accuracy = evaluation.places, evaluation.sequences[beliefs.name].accuracy
+    right = "no frame has a label" if accuracy is None else f"{percent(accuracy)} right"
     frames = len(beliefs.frames)
     # One more colour than places: the last answers for index -1, no label.
     colours = np.vstack([place_colours(places), WHITE])
@@ -47,7 +46,7 @@ def belief_strip(axes: "Axes", beliefs: Beliefs, *, places: Sequence[str] | None
     axes.set_yticks(heights, labels=["true", "belief", "decided", "wrong"], fontsize=6.5)
     axes.tick_params(axis="x", labelsize=6.5, length=2, pad=1.5)
     axes.tick_params(axis="y", length=0, pad=2)
-    axes.set_title(title, loc="left", fontsize=8.5, pad=3)
+    axes.set_title(f"{shorten(beliefs.name, 70)}   {right}", loc="left", fontsize=8.5, pad=3)
     if not frames:
         axes.text(0.5, 0.5, "no frames", ha="center", va="center", fontsize=8, color="0.4")
         return
@@ -103,11 +102,6 @@ def legend_panel(axes: "Axes", places: Sequence[str]) -> None:
     ]
     axes.axis("off")
     axes.legend(handles=patches, loc="upper left", ncols=2, frameon=False, fontsize=8, borderaxespad=0)
-
-
-def strip_title(name: str, accuracy: float | None) -> str:
-    """The line above a strip: which sequence, and how much of it was right."""
-    return f"{shorten(name, 70)}   {'no frame has a label' if accuracy is None else percent(accuracy) + ' right'}"
 
 
 def _shares(beliefs: Beliefs, drawn: Ints, places: Sequence[str]) -> tuple[Floats, Ints]:

@@ -156,8 +156,7 @@ def draw_frame_sheet(view: FrameView, typical: Mapping[int, Gray], path: Path | 
 
         def bare(left: float, top: float, wide: float = _PANEL) -> "Axes":
             axes = panel(figure, left, top, wide, _PANEL)
-            axes.set_xticks([])
-            axes.set_yticks([])
+            axes.set(xticks=[], yticks=[])
             return axes
 
         edges = view.spec.kind == "gist"

@@ -89,7 +89,9 @@ def draw_word_sheet(table: WordTable, images: Mapping[int, Gray], path: Path | s
     tiles = _Tiles(table.size, min(1.6, max(0.8, 5 / table.size), 32 / table.size), aspect)
     lattice = tiles.width * table.size, tiles.height * table.size
     width = max(_LEAST_WIDTH, 2 * MARGIN + 0.3 + lattice[0] + _GAP + _SIDE)
-    lines = [line for text in (*word_sentences(table), _READING) for line in _wrapped(text, width - 2 * MARGIN, 8.5)]
+    # Letters of 8.5 points, which are half as wide on the average.
+    room = int((width - 2 * MARGIN) * 72 / (0.54 * 8.5))
+    lines = [line for text in (*word_sentences(table), _READING) for line in textwrap.wrap(text, room)]
     head = 0.62 + 0.17 * len(lines)
     legend = _ROW * (len(table.places) + 2)
     # Below each other where the lattice is high enough for it, else side by side.
@@ -108,11 +110,6 @@ def draw_word_sheet(table: WordTable, images: Mapping[int, Gray], path: Path | s
         _heat(panel(figure, side, top, maps, maps), table, table.hits, "Blues", "Training frames per unit")
         spot = (side, top + maps + 0.75) if below >= beside else (side + maps + 0.3, top)
         _heat(panel(figure, *spot, maps, maps), table, table.u_matrix, "Greys", "U-matrix")
-
-
-def _wrapped(text: str, room: float, size: float) -> list[str]:
-    """The text in lines of `room` inches, in a font of `size` points whose letters are half as wide on the average."""
-    return textwrap.wrap(text, int(room * 72 / (0.54 * size)))
 
 
 def _lattice(axes: "Axes", table: WordTable, pictures: Sequence[Any], tiles: _Tiles) -> None:
@@ -223,8 +220,7 @@ def _heat(axes: "Axes", table: WordTable, values: NDArray[Any], cmap: str, title
     """A map of one number per unit, darker for more; its range is told below."""
     grid = values.reshape(table.size, table.size)
     axes.imshow(grid, cmap=cmap, interpolation="nearest", aspect="equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
+    axes.set(xticks=[], yticks=[])
     axes.spines[:].set_color("0.7")
     axes.set_title(title, loc="left", fontsize=8)
     low, high = (cast(float, f(grid)) for f in (np.min, np.max))

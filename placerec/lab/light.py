@@ -21,7 +21,6 @@ class Illumination:
     `sun` is the direction to the sun; `exposure` and `noise` (grey levels) are the camera's.
     """
 
-    name: str
     sky: float
     sunlight: float
     sun: tuple[float, float, float]
@@ -40,9 +39,9 @@ INDOORS = {"corridor": 0.8, "washroom": 1.0, "toilet": 0.7}
 ALL_ON = {"corridor": 0.75, "washroom": 1.0, "toilet": 0.9, "printer": 0.8, "kitchen": 0.9, "office": 0.8}
 
 ILLUMINATIONS = {
-    "cloudy": Illumination("cloudy", 1.5, 0.0, _sun(235, 35), INDOORS, (1.0, 1.0, 1.0), 1.0, 2.0),
-    "night": Illumination("night", 0.01, 0.0, _sun(235, 35), ALL_ON, (1.06, 1.0, 0.84), 0.72, 3.2),
-    "sunny": Illumination("sunny", 2.8, 6.0, _sun(232, 33), INDOORS, (1.03, 1.0, 0.95), 1.15, 1.8),
+    "cloudy": Illumination(1.5, 0.0, _sun(235, 35), INDOORS, (1.0, 1.0, 1.0), 1.0, 2.0),
+    "night": Illumination(0.01, 0.0, _sun(235, 35), ALL_ON, (1.06, 1.0, 0.84), 0.72, 3.2),
+    "sunny": Illumination(2.8, 6.0, _sun(232, 33), INDOORS, (1.03, 1.0, 0.95), 1.15, 1.8),
 }
 
 
@@ -70,10 +69,6 @@ class Opening:
     down: Array
     normal: Array
     clear: bool
-
-    @property
-    def middle(self) -> Array:
-        return np.asarray(self.corner + (self.across + self.down) / 2, np.float32)
 
     @property
     def area(self) -> float:
@@ -119,7 +114,7 @@ def _received(points: Array, normals: Array, room: Room, windows: list[Opening],
     for x, y in room.lamps if lamp else ():
         total += 1.9 * lamp * _falloff(points, normals, np.array([x, y, CEILING - 0.02]), np.array([0, 0, -1]))
     for w in windows:
-        total += 1.5 * light.sky * w.area * _falloff(points, normals, w.middle, w.normal)
+        total += 1.5 * light.sky * w.area * _falloff(points, normals, w.corner + (w.across + w.down) / 2, w.normal)
     # Light that bounces between the walls: in proportion to what comes in, over the room's surface.
     floor = (room.x1 - room.x0) * (room.y1 - room.y0)
     total += (1.3 * lamp * len(room.lamps) + 1.1 * light.sky * sum(w.area for w in windows)) / (floor + 4)

@@ -58,8 +58,7 @@ class Fixture:
 class Panel:
     """A rectangle in space: upper left corner, edge along its width, edge down its height, and its skin's name.
 
-    `room` says whose light falls on it; `front` panels are seen from one side only (walls, sides of boxes);
-    `parts` are fixtures pasted on its skin as (kind, x, z, width, height).
+    `room` says whose light falls on it; `parts` are fixtures pasted on its skin as (kind, x, z, width, height).
     """
 
     skin: str
@@ -67,7 +66,6 @@ class Panel:
     corner: Point
     across: Point
     down: Point
-    front: bool = True
     parts: tuple[tuple[str, float, float, float, float], ...] = ()
 
     @property
@@ -150,14 +148,9 @@ def place(x: float, y: float) -> str:
     return "PA-B" if x < -4.0 else "TL-B" if x < 3.4 else "KT-B"
 
 
-def fixtures(rng: np.random.Generator) -> tuple[Fixture, ...]:
-    """What is on the walls; `rng` moves posters and boards."""
-    return FIXED + tuple(replace(f, at=f.at + float(rng.uniform(-0.12, 0.12))) for f in HUNG)
-
-
 def walls(rng: np.random.Generator) -> list[Panel]:
-    """Every wall of every room, facing inwards and cut by the doorways, with its fixtures."""
-    hung = fixtures(rng)
+    """Every wall of every room, facing inwards and cut by the doorways, with its fixtures; `rng` moves what is hung."""
+    hung = FIXED + tuple(replace(f, at=f.at + float(rng.uniform(-0.12, 0.12))) for f in HUNG)
     panels: list[Panel] = []
     for r in ROOMS:
         sides = {
@@ -167,11 +160,8 @@ def walls(rng: np.random.Generator) -> list[Panel]:
             "west": ((r.x0, r.y0), (r.x0, r.y1)),
         }
         for side, (start, end) in sides.items():
-            on_wall = [f for f in hung if f.room == r.name and f.side == side]
-            panels += _wall(r, start, end, on_wall)
-    for d in DOORWAYS:
-        panels += _jambs(d)
-    return panels
+            panels += _wall(r, start, end, [f for f in hung if f.room == r.name and f.side == side])
+    return panels + [panel for d in DOORWAYS for panel in _jambs(d)]
 
 
 def _wall(r: Room, start: tuple[float, float], end: tuple[float, float], hung: list[Fixture]) -> list[Panel]:
@@ -201,7 +191,7 @@ def _jambs(d: Doorway) -> list[Panel]:
     return [
         Panel("jamb", "corridor", (d.x0, d.y0, d.top), (0.0, deep, 0.0), down),
         Panel("jamb", "corridor", (d.x1, d.y1, d.top), (0.0, -deep, 0.0), down),
-        Panel("jamb", "corridor", (d.x0, d.y0, d.top), (d.x1 - d.x0, 0.0, 0.0), (0.0, deep, 0.0), front=False),
+        Panel("jamb", "corridor", (d.x0, d.y0, d.top), (d.x1 - d.x0, 0.0, 0.0), (0.0, deep, 0.0)),
     ]
 
 

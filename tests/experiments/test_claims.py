@@ -5,8 +5,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
+from placerec.evaluation.bootstrap import draw
 from placerec.experiments.grid.claims import CANNOT_TELL, FAILS, HOLDS, judge
-from placerec.experiments.grid.results import MissingCellsError, Results, Row, SequenceCount, drawn, scores
+from placerec.experiments.grid.results import MissingCellsError, Results, Row, SequenceCount, scores
 
 SELECTS = ("none", "subsample:3", "subsample:5", "compress:3", "unique")
 Percent = Callable[[int, str, str, int, int], float]
@@ -126,7 +127,7 @@ def test_other_smoothings_do_not_count_beside_the_papers() -> None:
 def test_the_bootstrap_is_that_of_a_slow_version() -> None:
     results = grid(either, orders=(1, 2), selects=("none", "unique"), sequences=4)
     found = scores(results.rows, draws=50)
-    weights = drawn(4, 50)
+    weights = np.concatenate([np.ones((1, 4)), draw(4, 0, 50)])
     assert (weights[0] == 1).all()
     assert (weights.sum(axis=1) == 4).all()
     for d, weight in enumerate(weights.astype(int)):

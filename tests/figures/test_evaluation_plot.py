@@ -87,7 +87,7 @@ def test_what_is_unknown_is_drawn_and_judged(tmp_path: Path) -> None:
         assert needed in text, needed
     with figure_file(tmp_path / "a.png", 8, 3) as figure:
         axes = figure.subplots()
-        belief_strip(axes, beliefs[0])
+        belief_strip(axes, beliefs[0], result)
         belief = np.asarray(axes.images[1].get_array())
         wrong = np.asarray(axes.images[3].get_array())[0]
     # Three quarters of a frame in the kitchen are grey, from above.
@@ -159,7 +159,7 @@ def test_panels_draw_on_a_figure_of_ones_own(tmp_path: Path) -> None:
     beliefs = recording("seq1")
     with figure_file(tmp_path / "a.png", 8, 3) as figure:
         left, right = figure.subplots(1, 2)
-        belief_strip(left, beliefs, title="one strip")
+        belief_strip(left, beliefs, evaluate([beliefs]))
         confusion_panel(right, evaluate([beliefs]))
         # True places, beliefs, decided places, and what is wrong.
         assert len(left.images) == 4

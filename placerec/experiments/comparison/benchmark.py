@@ -136,7 +136,7 @@ def _decoded(decoder: SequenceDecoder, benchmark: Benchmark) -> MethodRun:
     return _timed(start, benchmark, [benchmark.encoded.streams[i].words for i in benchmark.tests])
 
 
-def _run_points(fit: Callable[[DescriptorTrainingSet, int], MakePointStepper], benchmark: Benchmark) -> MethodRun:
+def _run_points(fit: Callable[..., MakePointStepper], benchmark: Benchmark) -> MethodRun:
     """A method of descriptors, which learns from the labelled training frames as points."""
     places = benchmark.places
     streams = benchmark.encoded.streams[: benchmark.training]
@@ -147,7 +147,7 @@ def _run_points(fit: Callable[[DescriptorTrainingSet, int], MakePointStepper], b
     labelled = truth >= 0
     training = DescriptorTrainingSet(points[labelled], truth[labelled], sequences[labelled], places, steps)
     tests = [benchmark.encoded.points[i].astype(np.float64) for i in benchmark.tests]
-    return _timed(fit(training, benchmark.seed), benchmark, tests)
+    return _timed(fit(training, seed=benchmark.seed), benchmark, tests)
 
 
 def _run_cascade(benchmark: Benchmark) -> MethodRun:
@@ -194,9 +194,7 @@ def _timed(start: MakeStepper, benchmark: Benchmark, inputs: Sequence[Any]) -> M
     return MethodRun(beliefs, 1e6 * fastest / sum(map(len, inputs)))
 
 
-def _points(
-    fit: Callable[[DescriptorTrainingSet, int], MakePointStepper], package: str | None = None
-) -> ComparedMethod:
+def _points(fit: Callable[..., MakePointStepper], package: str | None = None) -> ComparedMethod:
     return ComparedMethod(partial(_run_points, fit), DESCRIPTORS, package)
 
 
@@ -208,8 +206,8 @@ COMPARED: dict[str, ComparedMethod] = {
     f"{HOHMM}-order1": ComparedMethod(_run_order1),
     **{name: _words(name, "learned" if name == "mtd" else "fixed") for name in METHODS if name != HOHMM},
     "pronobis2007": ComparedMethod(_run_cascade, TWO_WORDS),
-    "torralba2003": _points(lambda training, seed: torralba2003.fit(training, seed=seed)),
-    "ullah2008": _points(lambda training, seed: ullah2008.fit(training, seed=seed), "sklearn"),
-    "ullah2008-hmm": _points(lambda training, seed: ullah2008.fit_filtered(training, seed=seed), "sklearn"),
+    "torralba2003": _points(torralba2003.fit),
+    "ullah2008": _points(ullah2008.fit, "sklearn"),
+    "ullah2008-hmm": _points(ullah2008.fit_filtered, "sklearn"),
     "knn": _points(lambda training, seed: knn.fit(training), "sklearn"),
 }

@@ -58,7 +58,9 @@ def compare(
     that nothing can be compared on, MissingExtraError for what is not installed, and what `find_sequences` raises.
     """
     chosen = check_methods(methods)
-    _check_installed(chosen)
+    for name in chosen:
+        if package := COMPARED[name].package:
+            check_optional(package, name, "leave it out of --methods")
     out = Path(out)
     check_figure(out / "methods.png")
     training, tests = _split(train, test, source_options)
@@ -88,19 +90,12 @@ def compare(
 def check_methods(methods: Iterable[str] | None = None) -> list[str]:
     """The methods in the order of the table, all of them for None; EvaluationError for an unknown one or none."""
     names = set(COMPARED if methods is None else methods)
-    for name in sorted(names):
-        if name not in COMPARED:
-            raise EvaluationError(f"no method is called {name!r}; choose from {', '.join(COMPARED)}")
+    choice = f"choose from {', '.join(COMPARED)}"
+    if unknown := sorted(names.difference(COMPARED)):
+        raise EvaluationError(f"no method is called {unknown[0]!r}; {choice}")
     if not names:
-        raise EvaluationError(f"no method is named; choose from {', '.join(COMPARED)}")
+        raise EvaluationError(f"no method is named; {choice}")
     return [name for name in COMPARED if name in names]
-
-
-def _check_installed(names: Iterable[str]) -> None:
-    """Before any work: MissingExtraError for the first method that cannot run."""
-    for name in names:
-        if package := COMPARED[name].package:
-            check_optional(package, name, "leave it out of --methods")
 
 
 def _split(

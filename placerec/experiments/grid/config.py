@@ -111,15 +111,15 @@ class _Reader:
     def _check_keys(self) -> None:
         for table, content in self.content.items():
             if table not in _TABLES:
-                raise self._error(f"unknown table [{table}]", f"there are {_listed(f'[{name}]' for name in _TABLES)}")
+                raise self._error(f"unknown table [{table}]", f"there are [{'], ['.join(_TABLES)}]")
             if not isinstance(content, dict):
                 raise self._error(f"{table} = {content!r} is no table", f"write [{table}] on a line of its own")
             for key in content:
                 if key not in _TABLES[table]:
-                    raise self._error(f"unknown key {key!r} in [{table}]", f"there are {_listed(_TABLES[table])}")
+                    raise self._error(f"unknown key {key!r} in [{table}]", f"there are {', '.join(_TABLES[table])}")
         for table in ("data", "grid"):
             if table not in self.content:
-                raise self._error(f"the table [{table}] is missing", f"it holds {_listed(_TABLES[table])}")
+                raise self._error(f"the table [{table}] is missing", f"it holds {', '.join(_TABLES[table])}")
 
     def _one_of(self, data: Mapping[str, Any], first: str, second: str) -> None:
         if first in data and second in data:
@@ -169,12 +169,8 @@ class _Reader:
         return ExperimentError(f"{self.path}: {what}; {remedy}")
 
 
-def _listed(names: Any) -> str:
-    return ", ".join(names)
-
-
 def _choice(*names: str) -> Callable[[Any], str]:
-    return lambda value: "" if isinstance(value, str) and value in names else f"choose {_listed(names)}"
+    return lambda value: "" if isinstance(value, str) and value in names else f"choose {', '.join(names)}"
 
 
 def _whole(least: int, most: int, remedy: str) -> Callable[[Any], str]:

@@ -16,7 +16,7 @@ from placerec.evaluation import Evaluation
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.results import Row, Setting, by_seed
 from placerec.figures.canvas import figure_file, place_colours
-from placerec.figures.panels import belief_strip, confusion_panel, legend_panel, strip_title
+from placerec.figures.panels import belief_strip, confusion_panel, legend_panel
 from placerec.hohmm import Beliefs
 
 if TYPE_CHECKING:
@@ -44,8 +44,7 @@ def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, na
     values = [np.mean(seeds) for table in (accuracy, *baselines.values()) for seeds in table.values()]
     lowest = max(0, 10 * math.floor(10 * min(values)) - 10)
     width = 4.6 if narrow else _PANEL_WIDTH * columns
-    with figure_file(path, width, _PANEL_HEIGHT * lines + (1.6 if narrow else 1.0)) as figure:
-        figure.set_layout_engine("constrained")
+    with figure_file(path, width, _PANEL_HEIGHT * lines + (1.6 if narrow else 1.0), "constrained") as figure:
         grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
         for axes, (size, smoothing) in zip(grid.ravel(), panels, strict=True):
             own = [row for row in rows if (row.size, row.smoothing) == (size, smoothing)]
@@ -91,20 +90,17 @@ def draw_strips(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Path, 
     judged = [one for one in beliefs if scores[one.name].accuracy is not None]
     order = sorted(judged, key=lambda one: scores[one.name].accuracy or 0.0)
     shown = list({one.name: one for one in (order[-1], order[0])}.values())
-    with figure_file(path, width, 0.9 + 2.0 * len(shown)) as figure:
-        figure.set_layout_engine("constrained")
+    with figure_file(path, width, 0.9 + 2.0 * len(shown), "constrained") as figure:
         *strips, legend = figure.subplots(
             len(shown) + 1, 1, height_ratios=[1.0] * len(shown) + [0.12 * (2 + len(evaluation.places) // 2)]
         )
         for axes, one in zip(strips, shown, strict=True):
-            title = strip_title(one.name, scores[one.name].accuracy)
-            belief_strip(axes, one, places=evaluation.places, title=title)
+            belief_strip(axes, one, evaluation)
         legend_panel(legend, evaluation.places)
 
 
 def draw_confusion(evaluation: Evaluation, path: Path) -> None:
     """Draw the confusion matrix of an evaluation."""
     side = 2.0 + 0.5 * len(evaluation.places)
-    with figure_file(path, side + 1.0, side) as figure:
-        figure.set_layout_engine("constrained")
+    with figure_file(path, side + 1.0, side, "constrained") as figure:
         confusion_panel(figure.subplots(), evaluation)

@@ -200,14 +200,10 @@ def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
         for name, one in row.sequences.items():
             right[(*cell, number[name])] += one.right / seeds
             frames[number[name]], majority[number[name]] = one.frames, one.majority
-    weights = drawn(len(names), draws)
+    # Each sequence once, and then as often as a fixed seed draws it.
+    weights = np.concatenate([np.ones((1, len(names))), draw(len(names), 0, draws)])
     whole = weights @ frames
     with np.errstate(invalid="ignore", divide="ignore"):
         accuracy = np.nan_to_num(100 * np.einsum("abcds,ns->abcdn", right, weights) / whole)
         always = np.nan_to_num(100 * (weights @ majority) / whole)
     return Scores(size, smoothing, select, order, names, accuracy, always)
-
-
-def drawn(sequences: int, draws: int) -> Floats:
-    """How often each sequence is there, float64 (1 + draws, sequences): once each, then as a fixed seed draws them."""
-    return np.concatenate([np.ones((1, sequences)), draw(sequences, 0, draws).astype(np.float64)])
