@@ -23,7 +23,7 @@ from uuid import uuid4
 
 from placerec.ahead import look_ahead
 from placerec.errors import check_optional
-from placerec.jobs import JobError, LoggedResult, Numbered, RemoteExecutor, ScatteredMap, logged_result
+from placerec.jobs import JobError, LoggedResult, Numbered, RemoteExecutor, ScatteredMap, logged_result, uninterrupted
 from placerec.version import __version__
 
 T = TypeVar("T")
@@ -103,27 +103,15 @@ def _local(distributed: Any, workers: int) -> Iterator[str]:
     with TemporaryDirectory(prefix="placerec-") as folder, dask.config.set({"temporary-directory": folder}):
         options = {"threads_per_worker": 1, "processes": True, "dashboard_address": None}
         try:
-            with _uninterrupted():
+            if hasattr(signal, "pthread_sigmask"):
+                # It is there before the first process, and where it begins it lets Ctrl-C in again.
+                resource_tracker.ensure_running()
+            with uninterrupted():
                 made = distributed.LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)
         except (OSError, RuntimeError) as error:
             raise JobError(f"local:{workers}: the processes cannot be started ({error}); try fewer") from error
         with made:
             yield made.scheduler_address
-
-
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Threads and processes that begin here never see Ctrl-C, which a terminal sends to all: this thread ends them."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    # It is there before the first process, and where it begins it lets Ctrl-C in again.
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -185,11 +173,7 @@ class _Function:
         return self.function.item
 
 
-def _one(function: _Function, item: _Item[Any], level: int) -> LoggedResult[Any]:
-    return logged_result(function.here(), item.item, level)
-
-
-def _several(function: _Function, items: _Item[list[Any]], level: int) -> list[LoggedResult[Any]]:
+def _call(function: _Function, items: _Item[list[Any]], level: int) -> list[LoggedResult[Any]]:
     return [logged_result(function.here(), item, level) for item in items.item]
 
 
@@ -199,10 +183,9 @@ class _Dask:
         self._address = address
 
     def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
-        submit = self._submitter(_one, function)
-        tasks = ((lambda lost, item=item: submit(_Item(item))) for item in items)
-        for answer in self._results(tasks):
-            yield answer.replay()
+        submit = self._submitter(function)
+        tasks = ((lambda lost, item=item: submit(_Item([item]))) for item in items)
+        yield from self._results(tasks)
 
     def keep(self, items: Numbered[T], /) -> ScatteredMap[T]:
         """Maps functions over `items`, which are sent to the workers once, and again where a worker is lost."""
@@ -218,25 +201,26 @@ class _Dask:
             return places[group]
 
         def each(function: Callable[[T], R], /) -> Iterator[R]:
-            submit = self._submitter(_several, function)
+            submit = self._submitter(function)
             tasks = ((lambda lost, group=group: submit(place(group, lost))) for group in range(len(groups)))
-            for answer in chain.from_iterable(self._results(tasks)):
-                yield answer.replay()
+            yield from self._results(tasks)
 
         return each
 
-    def _submitter(self, call: Callable[..., Any], function: Callable[..., Any]) -> Callable[[Any], Any]:
-        """A function that submits `call(function, item)` for an item; `function` is sent to the scheduler once."""
+    def _submitter(self, function: Callable[..., Any]) -> Callable[[Any], Any]:
+        """A function that submits a task, `function` of some items; `function` is sent to the scheduler once."""
         # Under the function's name the scheduler remembers how long its tasks take.
         name = f"{getattr(getattr(function, 'func', function), '__name__', 'work').strip('_')}-{uuid4().hex}"
         known = self._client.submit(_Function, _Item(function), __version__, key=f"{name}-function")
         numbers, level = count(), log.getEffectiveLevel()
-        return lambda item: self._client.submit(call, known, item, level, key=(name, next(numbers)))
+        return lambda item: self._client.submit(_call, known, item, level, key=(name, next(numbers)))
 
     def _results(self, tasks: Iterable[Task]) -> Iterator[Any]:
-        """The results of the tasks in order; only some of them are submitted before the first is there."""
+        """The results of the tasks' items in order; only some tasks are submitted before the first is done."""
         ahead = 2 * self._threads() + 4
-        return look_ahead(lambda task: (task, task(False)), self._result, tasks, ahead, at_end=self._cancel)
+        found = look_ahead(lambda task: (task, task(False)), self._result, tasks, ahead, at_end=self._cancel)
+        for answer in chain.from_iterable(found):
+            yield answer.replay()
 
     def _cancel(self, submitted: Iterable[tuple[Task, Any]]) -> None:
         """Take back tasks that nobody waits for; nothing is said if the scheduler is gone."""

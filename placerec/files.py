@@ -96,7 +96,8 @@ def whole_folder(path: Path, owned: tuple[str, ...]) -> Iterator[Path]:
             yield partial
             partial.chmod(0o777 & ~_umask())
             _check_replaceable(path, target, owned)
-            _exchange(partial, target)
+            if not _swap(partial, target):
+                _move_in(partial, target)
     finally:
         _unlock(lock)
         shutil.rmtree(partial, ignore_errors=True)
@@ -275,12 +276,6 @@ def _check_replaceable(path: Path, target: Path, owned: tuple[str, ...]) -> None
         raise OutputError(f"{path}: holds {foreign[0]}, which this command does not write; {remedy}")
     if target == Path.cwd() or target.is_mount():
         raise OutputError(f"{path}: is the current folder or a mounted one; name a folder in it")
-
-
-def _exchange(partial: Path, target: Path) -> None:
-    """Put `partial` where `target` is, and what was there where `partial` was, or nowhere."""
-    if not _swap(partial, target):
-        _move_in(partial, target)
 
 
 def _swap(first: Path, second: Path) -> bool:

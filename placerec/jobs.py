@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice
@@ -129,9 +129,16 @@ def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few
         yield from (_threads if few > 2 else map)(function, first)
         return
     call = partial(_call, log.getEffectiveLevel())
-    with _Workers(jobs, function) as pool:
+    # Processes that begin empty, so that no thread or lock of this one is copied half-way.
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_begin, initargs=(function,)) as pool:
+
+        def submit(item: T) -> "Future[LoggedResult[R]]":
+            # A process that this starts meets Ctrl-C only once `_begin` has told it how to end.
+            with uninterrupted():
+                return pool.submit(call, item)
+
         try:
-            submit = partial(_submit, pool, call)
             items = chain(first, rest)
             for answer in look_ahead(submit, Future.result, items, 4 * jobs, at_end=partial(_shut, pool)):
                 yield answer.replay()
@@ -143,21 +150,18 @@ def _shut(pool: futures.Executor, _: Iterable[object]) -> None:
     pool.shutdown(cancel_futures=True)
 
 
-class _Workers(ProcessPoolExecutor):
-    """Processes that begin empty, so that no thread or lock of this one is copied half-way."""
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Threads and processes that begin within never see Ctrl-C, which a terminal sends to all, unless they ask for it.
 
-    def __init__(self, jobs: int, function: Callable[..., Any]) -> None:
-        spawn = multiprocessing.get_context("spawn")
-        super().__init__(jobs, mp_context=spawn, initializer=_begin, initargs=(function,))
-
-
-def _submit(pool: futures.Executor, call: Callable[[T], R], item: T) -> "Future[R]":
-    """Hand out an item; a process that this starts meets Ctrl-C only once `_begin` has told it how to end."""
+    Where the system has no such mask nothing changes.
+    """
     if not hasattr(signal, "pthread_sigmask"):
-        return pool.submit(call, item)
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        return pool.submit(call, item)
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 

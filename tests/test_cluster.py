@@ -281,7 +281,7 @@ def test_another_version(
     with pytest.raises(JobError, match=r"has placerec \d.*, and 99\.0 is wanted"), cluster(address):
         pass
     with pytest.raises(JobError, match=r"a worker has placerec 99\.0, and 1\.0 is wanted"):
-        room._one(room._Function(room._Item(double), "1.0"), room._Item(1), logging.INFO)
+        room._call(room._Function(room._Item(double), "1.0"), room._Item([1]), logging.INFO)
 
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

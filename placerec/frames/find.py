@@ -13,7 +13,6 @@ from itertools import chain
 from pathlib import Path
 
 from placerec.errors import SourceError, at
-from placerec.files import number_in
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
 from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames
@@ -28,9 +27,9 @@ from placerec.frames.layouts import (
     seconds_in,
 )
 from placerec.frames.naming import own_name, unique_names
-from placerec.frames.places import check_place, check_twins
+from placerec.frames.places import check_place, check_twins, checked_place
 from placerec.frames.recordings import WANTED as RECORDED
-from placerec.frames.recordings import find_intervals, is_recording, read_recording
+from placerec.frames.recordings import checked_seconds, find_intervals, is_recording, read_recording
 from placerec.frames.sequence import Frame, Sequence, SourceOptions
 
 log = logging.getLogger(__name__)
@@ -268,11 +267,5 @@ def _listed_frame(number: int, text: str) -> Frame:
     if len(more) > 2 or not path or "\0" in path:
         raise SourceError(at(STDIN, number, f"{text!r} is not 'path [TAB seconds [TAB place]]'"))
     seconds, place = (*more, "", "")[:2]
-    time = math.nan
-    if seconds:
-        time = number_in(seconds)
-        if not math.isfinite(time):
-            raise SourceError(at(STDIN, number, f"{seconds!r} is not a number of seconds; mend it"))
-    if place and (reason := check_place(place)):
-        raise SourceError(at(STDIN, number, f"place {place!r} {reason}; rename it"))
-    return Frame(path, time, place, Path(path))
+    time = checked_seconds(STDIN, number, seconds) if seconds else math.nan
+    return Frame(path, time, place and checked_place(STDIN, number, place), Path(path))

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.arrays import Singles
 from placerec.errors import SourceError
 from placerec.frames.sequence import Gray
 
@@ -75,7 +74,9 @@ def as_gray(pixels: NDArray[Any], name: str) -> Gray:
     if min(height, width) < MIN_SIDE:
         raise SourceError(f"{name}: is {width}x{height} pixels, and {MIN_SIDE} a side are needed; remove it")
     if pixels.dtype == np.uint16:
-        return _stretch(pixels)
+        peak = int(pixels.max())
+        depth = next(bits for bits in _DEPTHS if peak < 1 << bits)
+        return pixels * np.float32(255 / ((1 << depth) - 1))
     if pixels.dtype != np.uint8:
         raise SourceError(f"{name}: has pixels of type {pixels.dtype}; save it with 8 or 16 bits a channel")
     return pixels
@@ -116,12 +117,6 @@ def _jpeg_frame(data: bytes) -> int:
             return place
         place += 1 if data[place + 1] == 0xFF else 2 + struct.unpack_from(">H", data, place + 2)[0]
     return 0
-
-
-def _stretch(pixels: NDArray[np.uint16]) -> Singles:
-    peak = int(pixels.max())
-    depth = next(bits for bits in _DEPTHS if peak < 1 << bits)
-    return pixels * np.float32(255 / ((1 << depth) - 1))
 
 
 def _check_jpeg(name: str, data: bytes) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from placerec.errors import SourceError, at
 from placerec.files import read_lines
-from placerec.frames.places import PlaceList, check_place, read_places
+from placerec.frames.places import PlaceList, checked_place, read_places
 
 COLD_CAMERA, IDOL_CAMERA = "std_cam", "png"
 COLD_LIST, COLD_LIST_FOLDER = "places.lst", "localization"
@@ -128,6 +128,4 @@ def _range(path: Path, line: int, fields: list[str]) -> tuple[int, int, str]:
         raise SourceError(at(path, line, f"{' '.join(fields)!r} is not 'first last category'; mend it")) from error
     if ends[0] > ends[1]:
         raise SourceError(at(path, line, f"the range {first} to {last} ends before it starts; mend it"))
-    if reason := check_place(place):
-        raise SourceError(at(path, line, f"place {place!r} {reason}; rename it"))
-    return *ends, place
+    return *ends, checked_place(path, line, place)

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from placerec.errors import SourceError, at
+from placerec.errors import PlacerecError, SourceError, at
 from placerec.files import read_lines
 
 # The columns of the token and belief files, which stand beside the places there.
@@ -48,6 +48,13 @@ def check_place(name: str) -> str | None:
     return None
 
 
+def checked_place(path: Path | str, line: int, name: str, error: type[PlacerecError] = SourceError) -> str:
+    """`name` if it can be a place's name, else an `error` with its position."""
+    if reason := check_place(name):
+        raise error(at(path, line, f"place {name!r} {reason}; rename it"))
+    return name
+
+
 def check_twins(places: Iterable[tuple[str, str]]) -> None:
     """Raise SourceError if two places differ in case alone; `places` are pairs of a name and where it stands.
 
@@ -72,9 +79,7 @@ def read_places(path: Path, images: Collection[str] = ()) -> PlaceList:
             continue
         image, place = _split(path, number, line.strip(), images)
         # One string for all frames of a place.
-        place = sys.intern(place)
-        if reason := check_place(place):
-            raise SourceError(at(path, number, f"place {place!r} {reason}; rename it"))
+        place = checked_place(path, number, sys.intern(place))
         if places.setdefault(image, place) != place:
             message = (
                 f"{image} is labelled {place}, but {places[image]} in line {lines[image]}; remove one of the lines"

@@ -16,7 +16,7 @@ from pathlib import Path
 from placerec.errors import SourceError, at
 from placerec.files import number_in, read_lines
 from placerec.frames import bag, video
-from placerec.frames.places import check_place
+from placerec.frames.places import checked_place
 from placerec.frames.sequence import Frame, Recording, SourceOptions
 
 SUFFIX = ".labels"
@@ -138,15 +138,14 @@ def _interval(path: Path, number: int, fields: list[str]) -> Interval:
     if len(fields) != 3:
         line = " ".join(fields)
         raise SourceError(at(path, number, f"{line!r} is not 'start end place'; a place's name holds no white space"))
-    start, end = (_seconds(path, number, field) for field in fields[:2])
+    start, end = (checked_seconds(path, number, field) for field in fields[:2])
     if end <= start:
         raise SourceError(at(path, number, f"the interval {fields[0]} to {fields[1]} ends before it starts; mend it"))
-    if reason := check_place(fields[2]):
-        raise SourceError(at(path, number, f"place {fields[2]!r} {reason}; rename it"))
-    return Interval(start, end, fields[2], number)
+    return Interval(start, end, checked_place(path, number, fields[2]), number)
 
 
-def _seconds(path: Path, number: int, field: str) -> float:
+def checked_seconds(path: Path | str, number: int, field: str) -> float:
+    """The seconds that a field says, else a SourceError with its position."""
     seconds = number_in(field)
     if not math.isfinite(seconds):
         raise SourceError(at(path, number, f"{field!r} is not a number of seconds; mend it"))

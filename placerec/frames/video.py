@@ -67,7 +67,7 @@ def list_times(path: Path) -> "array[float]":
     if any(after - before < _SAME for before, after in pairwise(times)):
         # MPEG program streams: not every packet has its time.
         with _opened(path) as capture:
-            times = _increasing(_walked(path, capture), 1 / (_rate(capture) or 25))
+            times = _increasing(_walked(path, capture), 1 / (_property(capture, "FPS") or 25))
     with _opened(path) as capture:
         if not times or not any(_grab(capture) for _ in times):
             codec = _codec(capture)
@@ -101,7 +101,7 @@ def _walked(path: Path, capture: Any) -> Iterator[float]:
     while failures < _DAMAGED:
         if _grab(capture):
             lost, failures = lost + failures, 0
-            yield round(_seconds(capture), 6)
+            yield round(_property(capture, "POS_MSEC") / 1000, 6)
         else:
             # At a damaged packet as well as at the end.
             failures += 1
@@ -127,7 +127,7 @@ def _decoded(capture: Any, times: "array[float]", *, late: bool) -> Iterator[tup
         if not _grab(capture):
             failures += 1
             continue
-        failures, seconds = 0, _seconds(capture)
+        failures, seconds = 0, _property(capture, "POS_MSEC") / 1000
         if lag is None:
             lag = seconds - times[0] if late else 0.0
         found = bisect_left(times, seconds - lag - _SAME)
@@ -162,22 +162,14 @@ def _grab(capture: Any) -> bool:
         return bool(capture.grab())
 
 
-def _seconds(capture: Any) -> float:
+def _property(capture: Any, name: str) -> float:
     import cv2
 
-    return float(capture.get(cv2.CAP_PROP_POS_MSEC)) / 1000
-
-
-def _rate(capture: Any) -> float:
-    import cv2
-
-    return float(capture.get(cv2.CAP_PROP_FPS))
+    return float(capture.get(getattr(cv2, f"CAP_PROP_{name}")))
 
 
 def _codec(capture: Any) -> str:
-    import cv2
-
-    code = int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF
+    code = int(_property(capture, "FOURCC")) & 0xFFFFFFFF
     text = code.to_bytes(4, "little").decode("latin-1").strip()
     return text if text.isprintable() and text else "unknown"
 
@@ -193,9 +185,7 @@ def _check_readable(path: Path) -> None:
 
 def _tell_truncated(path: Path, capture: Any, times: "array[float]") -> None:
     """Warn if the header speaks of clearly more frames and of a later end; a guess from the file's size may be off."""
-    import cv2
-
-    count, rate = float(capture.get(cv2.CAP_PROP_FRAME_COUNT)), _rate(capture)
+    count, rate = _property(capture, "FRAME_COUNT"), _property(capture, "FPS")
     if rate > 0 and len(times) < 0.95 * count - 2 and times[-1] < 0.95 * count / rate:
         log.warning(
             "%s: is truncated or damaged: %d frames up to second %.1f are there, of about %.0f up to second %.1f",

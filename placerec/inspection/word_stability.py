@@ -20,7 +20,7 @@ from placerec.frames import Frame, Sequence, SourceOptions, all_images, find_seq
 from placerec.frames.sequence import Gray
 from placerec.jobs import Progress
 from placerec.vision import Dictionary
-from placerec.vision.spec import DescriptorSpec, check_describes_images, descriptor
+from placerec.vision.spec import DescriptorSpec, describer, descriptor
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ def word_changes(
     Noise is drawn by seed and number of the frame. An image that cannot be read is skipped and named in a warning;
     VisionError if none can be read, or if the dictionary is of descriptors that were computed elsewhere.
     """
-    check_describes_images(dictionary.spec)
+    describer(dictionary.spec)
     sequences = list(sequences)
     total = sum(len(sequence.frames) for sequence in sequences)
     words: list[Ints] = []

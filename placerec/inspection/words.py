@@ -16,7 +16,7 @@ from placerec.frames.table import FrameTable
 from placerec.jobs import Progress
 from placerec.vision import Descriptors, Dictionary, describe
 from placerec.vision.pca import project
-from placerec.vision.som import best_units
+from placerec.vision.som import Units, nearest_units
 
 _NAME_WIDTH = 32
 # Pixels, the longer side of the typical frame of a unit; a picture shows it with half as many at most.
@@ -113,7 +113,7 @@ def word_table(descriptors: Descriptors, dictionary: Dictionary) -> WordTable:
     """Look up the word of every frame, and what can be said of every unit."""
     count = len(dictionary.codebook)
     units, distances = dictionary.words(descriptors.values)
-    nearest, _ = best_units(project(descriptors.values, dictionary.pca), dictionary.codebook)
+    nearest, _ = nearest_units(project(descriptors.values, dictionary.pca), Units.of(dictionary.codebook))
     places = tuple(sorted(set(descriptors.places) - {""}))
     place = descriptors.table.places.codes(places)
     labelled = place >= 0

@@ -17,7 +17,7 @@ from placerec.frames.table import FrameTable, RowIndex
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal
 from placerec.vision.external import read_rows
-from placerec.vision.spec import DescriptorSpec, check_describes_images
+from placerec.vision.spec import DescriptorSpec, describer
 from placerec.vision.storage import StreamedArray, text_column, write_npz
 from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
 
@@ -115,7 +115,7 @@ def described(
     What could not be read is named in warnings and counted in `counts`. `journal`: gives back the batches of a run that
     was cut short, and keeps the others.
     """
-    check_describes_images(spec)
+    describer(spec)
     function = partial(describe_batch, spec)
     for batch, result in process_batches(
         function, sequences, spec, counts, key="describe", work=work, journal=journal, progress=progress
@@ -126,17 +126,13 @@ def described(
 
 @dataclass(frozen=True, eq=False)
 class KeptDescriptors:
-    """Descriptors that are in a journal, and not in memory: the frames that have one."""
+    """`Descriptors` that are in a journal, and not in memory: `values` come batch by batch."""
 
     spec: DescriptorSpec
+    values: StreamedArray
     table: FrameTable
-    counts: FrameCounts
-    journal: Journal
-
-    def pieces(self) -> Iterator[Singles]:
-        """The descriptors, batch by batch, again at every call."""
-        for content in self.journal.contents():
-            yield BatchResult.unpack(content).arrays["values"]
+    skipped: int
+    constant: int
 
 
 def keep_described(
@@ -149,7 +145,12 @@ def keep_described(
     """Describe every frame; the descriptors are left in the journal, where `describe` holds them in memory."""
     counts = FrameCounts()
     found = described(sequences, spec, counts, work=work, journal=journal, progress=progress)
-    return KeptDescriptors(spec, FrameTable.concat(table for table, _ in found), counts, journal)
+    table = FrameTable.concat(table for table, _ in found)
+    values = StreamedArray(
+        (len(table), spec.length),
+        lambda: (BatchResult.unpack(content).arrays["values"] for content in journal.contents()),
+    )
+    return KeptDescriptors(spec, values, table, counts.skipped, counts.constant)
 
 
 def _given(sequences: list[Sequence], spec: DescriptorSpec | None, matrix: Path) -> Descriptors:
@@ -174,17 +175,12 @@ def _given(sequences: list[Sequence], spec: DescriptorSpec | None, matrix: Path)
 def save_descriptors(descriptors: Descriptors | KeptDescriptors, path: Path | str) -> None:
     """Write descriptors.npz: `descriptors` (n, d) float32, `frames`, `sequences`, `times`, `places` and JSON `meta`."""
     table, spec = descriptors.table, descriptors.spec
-    if isinstance(descriptors, Descriptors):
-        values: Singles | StreamedArray = descriptors.values
-        counts: Descriptors | FrameCounts = descriptors
-    else:
-        values, counts = StreamedArray((len(table), spec.length), descriptors.pieces), descriptors.counts
     arrays: dict[str, Any] = {
-        "descriptors": values,
+        "descriptors": descriptors.values,
         "frames": text_column(table.names),
         "sequences": text_column(table.sequences),
         "times": table.times,
         "places": text_column(table.places),
     }
     meta = {"format": "placerec-descriptors", "version": 1, "descriptor": spec.as_dict()}
-    write_npz(Path(path), arrays, meta | {"skipped": counts.skipped, "constant": counts.constant})
+    write_npz(Path(path), arrays, meta | {"skipped": descriptors.skipped, "constant": descriptors.constant})

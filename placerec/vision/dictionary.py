@@ -194,7 +194,16 @@ class Dictionary:
 
     def save(self, path: Path | str) -> None:
         """Write words.npz: arrays and a JSON string `meta`, no pickle; the same dictionary gives the same bytes."""
-        write_npz(Path(path), self._arrays(), self._meta())
+        meta = {
+            "format": FORMAT,
+            "version": VERSION,
+            "placerec": __version__,
+            "descriptor": self.spec.as_dict(),
+            "training": asdict(self.training),
+            "quality": asdict(self.quality),
+            "sequences": list(self.sequences),
+        }
+        write_npz(Path(path), self._arrays(), meta)
 
     @classmethod
     def load(cls, path: Path | str) -> "Dictionary":
@@ -223,17 +232,6 @@ class Dictionary:
     def _arrays(self) -> Arrays:
         pca = {name: getattr(self.pca, name) for name in ("mean", "components", "variances")}
         return {**pca, "codebook": self.codebook, "hits": self.hits}
-
-    def _meta(self) -> dict[str, Any]:
-        return {
-            "format": FORMAT,
-            "version": VERSION,
-            "placerec": __version__,
-            "descriptor": self.spec.as_dict(),
-            "training": asdict(self.training),
-            "quality": asdict(self.quality),
-            "sequences": list(self.sequences),
-        }
 
 
 def _checked(descriptors: Source, spec: DescriptorSpec) -> Source:

@@ -187,30 +187,14 @@ def _online(
     return weights.astype(np.float32), epochs
 
 
-def best_units(codes: Singles, codebook: Singles, live: Mask | None = None) -> tuple[Ints, Singles]:
+def nearest_units(codes: Singles, units: Units) -> tuple[Ints, Singles]:
     """The nearest unit of every row of (n, k): int64 (n,), and the Euclidean distance to it: float32 (n,).
 
-    `live` (K,): units to choose from, all by default. Of equally near units the first is taken.
+    Of equally near units the first is taken.
     """
-    return nearest_units(codes, Units.of(codebook, live))
-
-
-def nearest_units(codes: Singles, units: Units) -> tuple[Ints, Singles]:
-    """`best_units` of a codebook that is ready: what a frame at a time would otherwise be computed for every frame."""
     found = _search(codes, units)
     far = distances(codes, units.places, found).astype(np.float32)
     return found if units.among is None else units.among[found], far
-
-
-def torn(codes: Singles, codebook: Singles, nearest: Ints) -> Mask:
-    """Which rows (n,) have a second nearest unit that is not one of the 8 neighbours of the nearest."""
-    if len(codebook) == 1:
-        return np.zeros(len(codes), np.bool_)
-    size = round(len(codebook) ** 0.5)
-    second = _search(codes, Units.of(codebook), without=nearest)
-    down, right = nearest // size - second // size, nearest % size - second % size
-    far: Mask = np.maximum(np.abs(down), np.abs(right)) > 1
-    return far
 
 
 def _spread(source: Source) -> tuple[int, Floats, Floats]:
@@ -335,7 +319,7 @@ def map_quality(source: Source, codebook: Singles, hits: Ints) -> MapQuality:
     """
     falls = np.zeros(len(codebook), np.int64)
     distance, apart = 0.0, 0
-    for counts, far, loose in each_chunk(source)(partial(_fall, codebook)):
+    for counts, far, loose in each_chunk(source)(partial(_fall, Units.of(codebook))):
         falls += counts
         distance += far
         apart += loose
@@ -353,8 +337,13 @@ def map_quality(source: Source, codebook: Singles, hits: Ints) -> MapQuality:
     )
 
 
-def _fall(codebook: Singles, rows: Singles) -> tuple[Ints, float, int]:
+def _fall(units: Units, rows: Singles) -> tuple[Ints, float, int]:
     """How many rows each unit got (K,), the sum of their distances, and how many have their next unit elsewhere."""
-    units, nearest = best_units(rows, codebook)
-    apart = int(np.count_nonzero(torn(rows, codebook, units)))
-    return np.bincount(units, minlength=len(codebook)), float(nearest.sum(dtype=np.float64)), apart
+    first, far = nearest_units(rows, units)
+    count, apart = len(units.places), 0
+    if count > 1:
+        size = round(count**0.5)
+        second = _search(rows, units, without=first)
+        down, right = first // size - second // size, first % size - second % size
+        apart = int(np.count_nonzero(np.maximum(np.abs(down), np.abs(right)) > 1))
+    return np.bincount(first, minlength=count), float(far.sum(dtype=np.float64)), apart

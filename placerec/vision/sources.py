@@ -77,7 +77,7 @@ def train_dictionary(
         else:
             spec = spec or DescriptorSpec()
             kept = keep_described(training, spec, journal, work, lambda done, _: tell(done, seen + unseen))
-            values = kept.pieces
+            values = kept.values.pieces
         dictionary = Dictionary.fit(values, spec=spec, options=options, work=work)
         dictionary = replace(dictionary, sequences=tuple(sequence.name for sequence in training))
         dictionary.save(unfinished)

@@ -75,18 +75,14 @@ KINDS = {
 }
 
 
-def check_describes_images(spec: DescriptorSpec) -> None:
-    """Raise VisionError if descriptors of this kind are not made from images here."""
-    _describer(spec)
-
-
 def descriptor(gray: Gray, spec: DescriptorSpec) -> Singles:
     """The descriptor of one grey image (h, w) of 0..255: float32 (spec.length,), zeros if the image is constant."""
-    describe = _describer(spec)
+    describe = describer(spec)
     return describe(fit_image(check_gray(gray), spec.image_size, spec.fit), spec)
 
 
-def _describer(spec: DescriptorSpec) -> Callable[[Gray, DescriptorSpec], Singles]:
+def describer(spec: DescriptorSpec) -> Callable[[Gray, DescriptorSpec], Singles]:
+    """What makes a descriptor of a fitted image; VisionError if such descriptors are not made from images here."""
     describe = KINDS[spec.kind].describe
     if describe is None:
         raise VisionError(

@@ -4,7 +4,7 @@ import hashlib
 import json
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
@@ -27,7 +27,7 @@ class StreamedArray:
     """An array that is not in memory: `pieces()` gives all of its rows, in order; `dtype` as in npy files."""
 
     shape: tuple[int, ...]
-    pieces: Callable[[], Iterable[NDArray[Any]]]
+    pieces: Callable[[], Iterator[NDArray[Any]]]
     dtype: str = "<f4"
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from placerec.arrays import Floats
 from placerec.errors import StreamError, at, refuse_string
 from placerec.files import all_lines, number_in, write_text
-from placerec.frames.places import check_place
+from placerec.frames.places import checked_place
 from placerec.frames.table import FrameTable
 
 COLUMNS = ("frame", "time", "place", "word", "distance")
@@ -116,12 +116,11 @@ def write_stream(stream: WordStream, path: Path | str) -> None:
 def format_rows(stream: WordStream) -> str:
     """The lines of a token stream file after its header; StreamError for a frame's name that a line cannot hold."""
     lines = []
-    for frame in stream.frames:
-        if set(frame) & set("\t\n\r"):
-            raise StreamError(f"{stream.name}: the frame {frame!r} holds a tab or a line end; rename the image")
     for frame, time, place, word, distance in zip(
         stream.frames, stream.times, stream.places, stream.words, stream.distances, strict=True
     ):
+        if set(frame) & set("\t\n\r"):
+            raise StreamError(f"{stream.name}: the frame {frame!r} holds a tab or a line end; rename the image")
         shown = "" if math.isnan(distance) else f"{distance:.6g}"
         lines.append(f"{frame}\t{format_seconds(time)}\t{place}\t{word}\t{shown}\n")
     return "".join(lines)
@@ -149,8 +148,8 @@ def read_stream(path: Path | str) -> WordStream:
     column = {title: [fields[at_] for _, fields in rows] for at_, title in enumerate(header)}
     line_numbers = [i for i, _ in rows]
     for i, place in zip(line_numbers, column.get("place", []), strict=False):
-        if place and (reason := check_place(place)):
-            raise StreamError(at(path, i, f"place {place!r} {reason}; rename it"))
+        if place:
+            checked_place(path, i, place, StreamError)
     blank = [""] * len(rows)
     times = _numbers(path, line_numbers, "time", column.get("time", blank))
     words = [check_word(path, i, word) for i, word in zip(line_numbers, column["word"], strict=True)]

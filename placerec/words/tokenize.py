@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+from placerec.arrays import Ints, Singles
 from placerec.files import whole_folder
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames import SourceOptions, find_sequences
@@ -13,7 +14,7 @@ from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal
 from placerec.vision import Descriptors, Dictionary, describe
-from placerec.vision.spec import check_describes_images
+from placerec.vision.spec import describer
 from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
 from placerec.words.folder import OWNED, fill_folder
 from placerec.words.stream import WordStream
@@ -68,12 +69,15 @@ def streams_of(
 def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStream]:
     """The token streams of described frames, one per sequence."""
     units, distances = dictionary.words(descriptors)
-    vocabulary = dictionary.vocabulary
-    streams = []
-    for name, rows in descriptors.table.by_sequence().items():
-        words = tuple(vocabulary[unit] for unit in units[rows].tolist())
-        streams.append(WordStream(name, descriptors.table.take(rows), words, distances[rows].astype(float)))
-    return streams
+    return [
+        _stream(name, descriptors.table.take(rows), dictionary, units[rows], distances[rows])
+        for name, rows in descriptors.table.by_sequence().items()
+    ]
+
+
+def _stream(name: str, table: FrameTable, dictionary: Dictionary, units: Ints, distances: Singles) -> WordStream:
+    words = tuple(map(dictionary.vocabulary.__getitem__, units.tolist()))
+    return WordStream(name, table, words, distances.astype(float))
 
 
 def tokenize_batch(dictionary: Dictionary, batch: Batch) -> BatchResult:
@@ -113,16 +117,13 @@ def _tokenized(
     journal: Journal | None,
     progress: Progress | None,
 ) -> Iterator[WordStream]:
-    check_describes_images(dictionary.spec)
+    describer(dictionary.spec)
     function, counts, key = partial(tokenize_batch, dictionary), FrameCounts(), dictionary.fingerprint
     found = process_batches(
         function, sequences, dictionary.spec, counts, key=key, work=work, journal=journal, progress=progress
     )
-    vocabulary = dictionary.vocabulary
     for batch, result in found:
-        frames = result.frames_of(batch)
-        if frames:
-            words = tuple(vocabulary[unit] for unit in result.arrays["units"].tolist())
+        if frames := result.frames_of(batch):
             table = FrameTable.of_frames(batch.sequence, frames)
-            yield WordStream(batch.sequence, table, words, result.arrays["distances"].astype(float))
+            yield _stream(batch.sequence, table, dictionary, result.arrays["units"], result.arrays["distances"])
     counts.close()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from placerec.errors import VisionError
 from placerec.vision.chunks import CHUNK, Stream, chunks
-from placerec.vision.som import RULES, MapQuality, Som, best_units, map_quality, train_som
+from placerec.vision.som import RULES, MapQuality, Som, Units, map_quality, nearest_units, train_som
 
 
 def sample(n: int = 600, d: int = 6, seed: int = 0) -> NDArray[np.float32]:
@@ -167,7 +167,7 @@ def test_training_stops_when_settled_and_not_in_the_cooling_half() -> None:
 def test_hits_count_the_training_frames() -> None:
     codes = sample()
     som = train(codes)
-    units, _ = best_units(codes, som.codebook)
+    units, _ = nearest_units(codes, Units.of(som.codebook))
     np.testing.assert_array_equal(som.hits, np.bincount(units, minlength=36))
     assert som.hits.dtype == np.int64
 
@@ -193,7 +193,7 @@ def test_topographic_error_by_hand() -> None:
 
 def test_distances_and_units_are_those_of_brute_force() -> None:
     codes, codebook = sample(5000), sample(49, seed=3)
-    units, distances = best_units(codes, codebook)
+    units, distances = nearest_units(codes, Units.of(codebook))
     every = brute_force(codes, codebook)
     np.testing.assert_array_equal(units, every.argmin(axis=1))
     np.testing.assert_allclose(distances, every.min(axis=1), rtol=1e-6)
@@ -209,7 +209,9 @@ def test_near_ties_are_decided_exactly(seed: int, offset: float) -> None:
     codebook = (offset + np.repeat(rng.normal(size=(10, 8)), 3, axis=0)).astype(np.float32)
     codebook[::3] += (1e-6 * rng.normal(size=(10, 8))).astype(np.float32)
     codes = (codebook[rng.integers(30, size=200)] + 1e-5 * rng.normal(size=(200, 8))).astype(np.float32)
-    np.testing.assert_array_equal(best_units(codes, codebook)[0], brute_force(codes, codebook).argmin(axis=1))
+    np.testing.assert_array_equal(
+        nearest_units(codes, Units.of(codebook))[0], brute_force(codes, codebook).argmin(axis=1)
+    )
 
 
 @pytest.mark.parametrize("k", [1, 2])
@@ -218,13 +220,15 @@ def test_near_ties_of_few_components_are_decided_exactly(k: int) -> None:
     rng = np.random.default_rng(0)
     codebook = (1000 + 0.1 * rng.normal(size=(20, k))).astype(np.float32)
     codes = (1000 + 0.1 * rng.normal(size=(500, k))).astype(np.float32)
-    np.testing.assert_array_equal(best_units(codes, codebook)[0], brute_force(codes, codebook).argmin(axis=1))
+    np.testing.assert_array_equal(
+        nearest_units(codes, Units.of(codebook))[0], brute_force(codes, codebook).argmin(axis=1)
+    )
 
 
 def test_only_live_units_answer() -> None:
     codes, codebook = sample(500), sample(36, seed=3)
     live = np.arange(36) % 3 == 0
-    units, distances = best_units(codes, codebook, live)
+    units, distances = nearest_units(codes, Units.of(codebook, live))
     assert live[units].all()
     every = np.where(live, brute_force(codes, codebook), np.inf)
     np.testing.assert_array_equal(units, every.argmin(axis=1))
