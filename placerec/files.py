@@ -32,13 +32,13 @@ def whole_file(path: Path) -> Iterator[Path]:
     A link is written through. Raises OutputError if `path` cannot be written, or is a folder or a device.
     """
     path = Path(path)
-    with _writing(path):
+    with writing(path):
         target = path.resolve()
         if target.exists() and not target.is_file():
             kind = "a folder" if target.is_dir() else "no regular file"
             raise OutputError(f"{path}: is {kind}, and a file is to be written; name another")
         target.parent.mkdir(parents=True, exist_ok=True)
-    with _writing(path), replaced_file(target) as partial, _writing(path, partial):
+    with writing(path), replaced_file(target) as partial, writing(path, partial):
         yield partial
 
 
@@ -84,7 +84,7 @@ def whole_folder(path: Path, owned: tuple[str, ...]) -> Iterator[Path]:
     removed; a run that goes on at the same time is not disturbed, and the last one to end is the one that stays.
     """
     path = Path(path)
-    with _writing(path):
+    with writing(path):
         target = path.resolve()
         _check_replaceable(path, target, owned)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -92,7 +92,7 @@ def whole_folder(path: Path, owned: tuple[str, ...]) -> Iterator[Path]:
         partial = Path(tempfile.mkdtemp(prefix=PARTIAL.format(target.name), dir=target.parent))
         lock = _lock(partial)
     try:
-        with _writing(path, partial):
+        with writing(path, partial):
             yield partial
             partial.chmod(0o777 & ~_umask())
             _check_replaceable(path, target, owned)
@@ -249,7 +249,7 @@ def _not_utf8(path: Path, line: int, byte: int) -> str:
 
 
 @contextmanager
-def _writing(path: Path, partial: Path | None = None) -> Iterator[None]:
+def writing(path: Path, partial: Path | None = None) -> Iterator[None]:
     """What the system refuses within is an OutputError that names `path`, also for what is still in `partial`."""
     try:
         yield

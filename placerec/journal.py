@@ -14,7 +14,7 @@ from io import FileIO
 from pathlib import Path
 
 from placerec.errors import OutputError
-from placerec.files import PARTIAL, locked, sweep_files
+from placerec.files import PARTIAL, locked, sweep_files, writing
 from placerec.jobs import JobError
 
 _HEAD = struct.Struct("<16sQQ")
@@ -39,15 +39,13 @@ class Journal:
     def add(self, key: bytes, content: bytes) -> None:
         """Append a result; what an earlier run has from here on is forgotten. OutputError if the disk is full."""
         rest = struct.pack("<QQ", len(key), len(content)) + key + content
-        try:
+        with writing(self._path):
             if self._file.seek(0, os.SEEK_END) != self._at:
                 self._file.truncate(self._at)
                 self._file.seek(self._at)
             left = memoryview(blake2b(rest, digest_size=16).digest() + rest)
             while left:
                 left = left[self._file.write(left) :]
-        except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written: {error.strerror or error}") from error
         self._at = self._file.tell()
 
     def contents(self) -> Iterator[bytes]:
@@ -87,7 +85,7 @@ def open_journal(output: Path) -> Iterator[Journal]:
 
 def _opened(path: Path, output: Path) -> tuple[FileIO, bool]:
     """The file to write to, and whether it is `path`."""
-    try:
+    with writing(output):
         path.parent.mkdir(parents=True, exist_ok=True)
         # A link there is none of ours. Without a buffer: what does not fit must not be tried again when it is closed.
         with suppress(PermissionError):
@@ -97,8 +95,6 @@ def _opened(path: Path, output: Path) -> tuple[FileIO, bool]:
                 return file, True
             file.close()
         return tempfile.TemporaryFile(dir=path.parent, buffering=0), False
-    except OSError as error:
-        raise OutputError(f"{output}: cannot be written: {error.strerror or error}") from error
 
 
 def _read(file: FileIO) -> tuple[bytes, bytes] | None:

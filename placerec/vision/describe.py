@@ -1,7 +1,7 @@
 """Sequences -> descriptors: every frame is read, described and forgotten."""
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from collections.abc import Sequence as Ordered
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -17,7 +17,7 @@ from placerec.frames.table import FrameTable, RowIndex
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal
 from placerec.vision.external import read_rows
-from placerec.vision.spec import DescriptorSpec, describer
+from placerec.vision.spec import DescriptorSpec
 from placerec.vision.storage import StreamedArray, text_column, write_npz
 from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
 
@@ -97,31 +97,10 @@ def describe(
     if matrix is not None:
         return _given(sequences, spec, Path(matrix))
     spec, counts = spec or DescriptorSpec(), FrameCounts()
-    tables, values = zip(*described(sequences, spec, counts, work=work, progress=progress), strict=True)
-    return Descriptors(spec, np.concatenate(values), FrameTable.concat(tables), counts.skipped, counts.constant)
-
-
-def described(
-    sequences: list[Sequence],
-    spec: DescriptorSpec,
-    counts: FrameCounts,
-    *,
-    work: Executor | None = None,
-    journal: Journal | None = None,
-    progress: Progress | None = None,
-) -> Iterator[tuple[FrameTable, Singles]]:
-    """Batch after batch the frames that have a descriptor, and the descriptors (m, spec.length).
-
-    What could not be read is named in warnings and counted in `counts`. `journal`: gives back the batches of a run that
-    was cut short, and keeps the others.
-    """
-    describer(spec)
-    function = partial(describe_batch, spec)
-    for batch, result in process_batches(
-        function, sequences, spec, counts, key="describe", work=work, journal=journal, progress=progress
-    ):
-        yield FrameTable.of_frames(batch.sequence, result.frames_of(batch)), result.arrays["values"]
-    counts.close()
+    found = process_batches(partial(describe_batch, spec), sequences, spec, counts, work=work, progress=progress)
+    tables, arrays = zip(*found, strict=True)
+    values = np.concatenate([some["values"] for some in arrays])
+    return Descriptors(spec, values, FrameTable.concat(tables), counts.skipped, counts.constant)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +122,8 @@ def keep_described(
     progress: Progress | None = None,
 ) -> KeptDescriptors:
     """Describe every frame; the descriptors are left in the journal, where `describe` holds them in memory."""
-    counts = FrameCounts()
-    found = described(sequences, spec, counts, work=work, journal=journal, progress=progress)
+    function, counts = partial(describe_batch, spec), FrameCounts()
+    found = process_batches(function, sequences, spec, counts, work=work, journal=journal, progress=progress)
     table = FrameTable.concat(table for table, _ in found)
     values = StreamedArray(
         (len(table), spec.length),

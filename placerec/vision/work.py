@@ -10,7 +10,6 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import SourceError, VisionError
@@ -19,11 +18,13 @@ from placerec.frames import Frame, read_gray
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.images import Batch, batches, content_key, with_images
 from placerec.frames.sequence import Gray
+from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress, RemoteExecutor, workers
 from placerec.journal import Journal
 from placerec.version import __version__
 from placerec.vision.images import check_gray, fit_image
-from placerec.vision.spec import DescriptorSpec, descriptor
+from placerec.vision.spec import DescriptorSpec, describer, descriptor
+from placerec.vision.storage import Arrays
 
 log = logging.getLogger(__name__)
 
@@ -39,11 +40,7 @@ class BatchResult:
     kept: Ints
     blank: Mask
     reasons: tuple[str, ...]
-    arrays: dict[str, NDArray[Any]]
-
-    def frames_of(self, batch: Batch) -> list[Frame]:
-        """The frames of the batch that have a row."""
-        return [batch.frames[k] for k in self.kept.tolist()]
+    arrays: Arrays
 
     def pack(self) -> bytes:
         """As bytes; `unpack` is the way back."""
@@ -112,16 +109,20 @@ def process_batches(
     spec: DescriptorSpec,
     counts: FrameCounts,
     *,
-    key: str,
+    key: str = "describe",
     work: Executor | None = None,
     journal: Journal | None = None,
     progress: Progress | None = None,
-) -> Iterator[tuple[Batch, BatchResult]]:
-    """`function` of every batch of the sequences, in order; what could not be read is named in warnings and counted.
+) -> Iterator[tuple[FrameTable, Arrays]]:
+    """Of every batch of the sequences, in order, the frames that have a row in what `function` finds, and the arrays.
+
+    What could not be read is named in warnings and counted in `counts`. Raises VisionError if no image can be read, or
+    if descriptors of the kind of `spec` are not made from images here.
 
     `key`: what the answers depend on besides the images; by it, `journal` gives back those of a run that was cut
     short, and keeps the others. `progress` is called with frames done and in all, 0 for a camera.
     """
+    describer(spec)
     endless = any(sequence.recording is not None and sequence.recording.endless for sequence in sequences)
     # Ctrl-C ends what a camera records, and would end other processes.
     work = workers() if endless or work is None else work
@@ -139,7 +140,9 @@ def process_batches(
         counts.constant += len(blank)
         if progress is not None:
             progress(counts.frames, total)
-        yield batch, result
+        frames = [batch.frames[k] for k in result.kept.tolist()]
+        yield FrameTable.of_frames(batch.sequence, frames), result.arrays
+    counts.close()
 
 
 def _found(

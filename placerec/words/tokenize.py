@@ -1,20 +1,18 @@
 """From images to token streams: the word of every frame."""
 
 import logging
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
 from placerec.arrays import Ints, Singles
 from placerec.files import whole_folder
-from placerec.frames import Sequence as FrameSequence
 from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.images import Batch
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal
 from placerec.vision import Descriptors, Dictionary, describe
-from placerec.vision.spec import describer
 from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
 from placerec.words.folder import OWNED, fill_folder
 from placerec.words.stream import WordStream
@@ -70,14 +68,14 @@ def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStre
     """The token streams of described frames, one per sequence."""
     units, distances = dictionary.words(descriptors)
     return [
-        _stream(name, descriptors.table.take(rows), dictionary, units[rows], distances[rows])
-        for name, rows in descriptors.table.by_sequence().items()
+        _stream(descriptors.table.take(rows), dictionary, units[rows], distances[rows])
+        for rows in descriptors.table.by_sequence().values()
     ]
 
 
-def _stream(name: str, table: FrameTable, dictionary: Dictionary, units: Ints, distances: Singles) -> WordStream:
+def _stream(table: FrameTable, dictionary: Dictionary, units: Ints, distances: Singles) -> WordStream:
     words = tuple(map(dictionary.vocabulary.__getitem__, units.tolist()))
-    return WordStream(name, table, words, distances.astype(float))
+    return WordStream(table.sequences[0], table, words, distances.astype(float))
 
 
 def tokenize_batch(dictionary: Dictionary, batch: Batch) -> BatchResult:
@@ -102,28 +100,21 @@ def _parts(
     if matrix is not None:
         parts = iter(tokens_of(describe(sequences, dictionary.spec, matrix=matrix), dictionary))
     else:
-        parts = _tokenized(sequences, dictionary, work, journal, progress)
+        found = process_batches(
+            partial(tokenize_batch, dictionary),
+            sequences,
+            dictionary.spec,
+            FrameCounts(),
+            key=dictionary.fingerprint,
+            work=work,
+            journal=journal,
+            progress=progress,
+        )
+        parts = (
+            _stream(table, dictionary, arrays["units"], arrays["distances"]) for table, arrays in found if len(table)
+        )
     for part in parts:
         names.add(part.name)
         yield part
     for name in sorted({sequence.name for sequence in sequences} - names):
         log.warning("%s: none of its images can be read; the sequence is left out", name)
-
-
-def _tokenized(
-    sequences: Sequence[FrameSequence],
-    dictionary: Dictionary,
-    work: Executor | None,
-    journal: Journal | None,
-    progress: Progress | None,
-) -> Iterator[WordStream]:
-    describer(dictionary.spec)
-    function, counts, key = partial(tokenize_batch, dictionary), FrameCounts(), dictionary.fingerprint
-    found = process_batches(
-        function, sequences, dictionary.spec, counts, key=key, work=work, journal=journal, progress=progress
-    )
-    for batch, result in found:
-        if frames := result.frames_of(batch):
-            table = FrameTable.of_frames(batch.sequence, frames)
-            yield _stream(batch.sequence, table, dictionary, result.arrays["units"], result.arrays["distances"])
-    counts.close()
