@@ -207,15 +207,11 @@ def _head(path: Path, lines: int) -> str:
 
 
 def _inspected(model: Path, place: str) -> str:
-    first = (model / f"sentences/{place}.txt").read_text(encoding="utf-8").split()
-    found = inspect_model(model / f"{place}.arpa", [" ".join(first[:2]), f"{first[0]} {_unseen(first)}"], top=3)
+    words = (model / f"sentences/{place}.txt").read_text(encoding="utf-8").split()
+    after = {second for first, second in pairwise(words) if first == words[0]}
+    never = next((word for word in words if word not in after), words[0])
+    found = inspect_model(model / f"{place}.arpa", [" ".join(words[:2]), f"{words[0]} {never}"], top=3)
     return format_inspection(found | {"path": f"{place}.arpa"})
-
-
-def _unseen(words: Sequence[str]) -> str:
-    """A word that never followed the first one."""
-    after = {b for a, b in pairwise(words) if a == words[0]}
-    return next((word for word in words if word not in after), words[0])
 
 
 def _commands(scale: str, seed: int) -> str:

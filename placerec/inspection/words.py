@@ -189,8 +189,7 @@ def u_matrix(codebook: Singles) -> Floats:
 def word_sentences(table: WordTable) -> list[str]:
     """What there is to say of the words in general, in a few sentences."""
     frames, sequences = len(table.looked_at), len(table.looked_at.by_sequence())
-    live = int((table.hits > 0).sum())
-    seen = int((table.frames > 0).sum())
+    live, seen = int((table.hits > 0).sum()), int((table.frames > 0).sum())
     which = "all" if live == len(table.words) else str(live)
     told = [
         f"{len(table.words)} units, {which} of them hit in training; {seen} are words of "

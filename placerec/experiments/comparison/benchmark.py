@@ -20,6 +20,7 @@ from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder
 from placerec.lm.backoff import unite_models
 from placerec.methods import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
 from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
+from placerec.methods.tables import PairEmissions
 from placerec.model import Decoding, ModelOptions, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
 from placerec.words import Selection, place_steps, sentences_per_place
@@ -109,23 +110,11 @@ def _words(name: str, transition: str = "fixed") -> ComparedMethod:
 def _run_order1(benchmark: Benchmark) -> MethodRun:
     """`hohmm` without the words before: the unigrams, smoothing and transitions of the models."""
     models = benchmark.models
+    union, words = unite_models(list(models.models.values())), next(iter(models.models.values())).words
+    log10_p = np.concatenate([union.score([word]) for word in words])
+    emissions = PairEmissions(words, 1, lambda ids, _: log10_p[ids])
     transition = transition_of(models, Decoding(transition="learned"))
-    return _decoded(Recognizer(models.models, transition=transition, emissions=_Unigrams(models)), benchmark)
-
-
-class _Unigrams:
-    """Emissions of the places' models for words without those before them."""
-
-    def __init__(self, models: PlaceModels) -> None:
-        self._emissions = unite_models(list(models.models.values()))
-
-    def score(self, words: Sequence[str]) -> Floats:
-        """log10 p of each of T words in each of C places, float64 (T, C)."""
-        return np.concatenate([self._emissions.score([word]) for word in words])
-
-    def follow(self) -> Callable[[str], Sequence[float]]:
-        """What gives log10 p of a word in each place."""
-        return lambda word: self._emissions.follow()(word)
+    return _decoded(Recognizer(models.models, transition=transition, emissions=emissions), benchmark)
 
 
 def _decoded(decoder: SequenceDecoder, benchmark: Benchmark) -> MethodRun:
