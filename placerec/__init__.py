@@ -30,21 +30,24 @@ _ROOMS = {
     ),
     "placerec.model": ("Decoding", "ModelOptions", "calibrate", "load_recognizer", "train_lm", "update"),
     "placerec.methods": ("decode", "follow_live", "load_decoder"),
-    "placerec.evaluation": ("evaluate",),
-    "placerec.experiments.comparison": ("compare",),
-    "placerec.experiments.grid": ("experiment",),
-    "placerec.figures": ("evaluate_files",),
-    "placerec.inspection": ("inspect_decision", "show_frame", "show_words", "stability"),
-    "placerec.lab": ("render_lab",),
+    "placerec.evaluation.metrics": ("evaluate",),
+    "placerec.experiments.comparison.run": ("compare",),
+    "placerec.experiments.grid.run": ("experiment",),
+    "placerec.figures.evaluation": ("evaluate_files",),
+    "placerec.inspection.decision": ("inspect_decision",),
+    "placerec.inspection.frame": ("show_frame",),
+    "placerec.inspection.word_sheet": ("show_words",),
+    "placerec.inspection.word_stability": ("stability",),
+    "placerec.lab.layout": ("render_lab",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 
 if TYPE_CHECKING:
     from placerec.errors import PlacerecError
-    from placerec.evaluation import evaluate
-    from placerec.experiments.comparison import compare
-    from placerec.experiments.grid import experiment
-    from placerec.figures import evaluate_files
+    from placerec.evaluation.metrics import evaluate
+    from placerec.experiments.comparison.run import compare
+    from placerec.experiments.grid.run import experiment
+    from placerec.figures.evaluation import evaluate_files
     from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, read_gray
     from placerec.hohmm import (
         Belief,
@@ -57,8 +60,11 @@ if TYPE_CHECKING:
         read_beliefs,
         read_transitions,
     )
-    from placerec.inspection import inspect_decision, show_frame, show_words, stability
-    from placerec.lab import render_lab
+    from placerec.inspection.decision import inspect_decision
+    from placerec.inspection.frame import show_frame
+    from placerec.inspection.word_sheet import show_words
+    from placerec.inspection.word_stability import stability
+    from placerec.lab.layout import render_lab
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.check import check_model
     from placerec.lm.inspect import inspect_model

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from placerec.errors import check_optional
-from placerec.evaluation import Evaluation, evaluate
-from placerec.figures import plot_evaluation
+from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.figures.canvas import figure_file
+from placerec.figures.evaluation import plot_evaluation
 from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence
@@ -19,7 +19,7 @@ from placerec.hohmm import Beliefs, write_beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import WordTable, typical_images, word_sentences, word_table
 from placerec.jobs import ProgressBar
-from placerec.lab import render_lab
+from placerec.lab.layout import render_lab
 from placerec.lm.inspect import format_inspection, inspect_model
 from placerec.model import ModelOptions, load_recognizer, read_corpus, train_model
 from placerec.vision import Dictionary, DictionaryOptions, describe

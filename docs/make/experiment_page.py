@@ -20,12 +20,12 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import LEAST
-from placerec.experiments.grid import Results, Row, experiment
 from placerec.experiments.grid.claims import Claim, judge
-from placerec.experiments.grid.results import SequenceCount, by_seed
+from placerec.experiments.grid.results import Results, Row, SequenceCount, by_seed
+from placerec.experiments.grid.run import experiment
 from placerec.experiments.grid.tables import Table, markdown, numbers_of
 from placerec.files import write_text
-from placerec.lab import render_lab
+from placerec.lab.layout import render_lab
 
 PAGE = Path(__file__).parents[1] / "experiment.md"
 FOLDER = PAGE.with_suffix("")

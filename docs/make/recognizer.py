@@ -15,7 +15,7 @@ import numpy as np
 from held_out import part
 from single_frame import SEEDS, SIZE, arguments, described, fold_names
 
-from placerec.evaluation import Evaluation, evaluate
+from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.hohmm import Beliefs, Recognizer, Transition, fixed_transition, learned_transition
 from placerec.lm import count_ngrams
 from placerec.model.options import ModelOptions

@@ -157,8 +157,8 @@ def evaluate(beliefs: tuple[Path, ...], as_json: bool, plot: Path | None) -> Non
     BELIEFS are files of decode (.tsv), folders of them, or `-`. Prints the accuracy beside that of the majority class,
     recall and precision per place, the confusion matrix, and how good the beliefs are as probabilities.
     """
-    from placerec.evaluation import format_evaluation
-    from placerec.figures import evaluate_files
+    from placerec.evaluation.summary import format_evaluation
+    from placerec.figures.evaluation import evaluate_files
 
     if _STDIN in beliefs and sys.stdin is None:
         raise click.UsageError("`-` reads standard input, and that is closed")

@@ -84,7 +84,7 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
     transition = ["fixed", "learned"]
     seeds = 5
     """
-    from placerec.experiments.grid import experiment as run
+    from placerec.experiments.grid.run import experiment as run
     from placerec.jobs import processors
 
     results = run(config, out, jobs=jobs or processors(), progress=progress_bar)
@@ -107,7 +107,7 @@ def lab(out: Path, scale: str, seed: int) -> None:
 
     18 image sequences of five places: two paths, three illuminations, three runs of each.
     """
-    from placerec.lab import render_lab
+    from placerec.lab.layout import render_lab
 
     with progress_bar("render") as progress:
         frames = render_lab(out, scale=scale, seed=seed, progress=progress)

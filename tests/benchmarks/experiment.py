@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from placerec.experiments.grid import experiment
+from placerec.experiments.grid.run import experiment
 from placerec.vision import gist
 from placerec.words import WordStream, write_stream, write_vocabulary
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from helpers.small_world import write_tokens
 
-from placerec.experiments.grid import read_config
+from placerec.experiments.grid.config import read_config
 from placerec.experiments.grid.results import COLUMNS, SEQUENCE_COLUMNS
 from placerec.experiments.grid.tables import PAPER_RUNS
 

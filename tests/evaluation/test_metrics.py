@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from placerec.errors import EvaluationError
-from placerec.evaluation import Evaluation, evaluate
 from placerec.evaluation.confidence import reliability
-from placerec.evaluation.metrics import change_latencies
+from placerec.evaluation.metrics import Evaluation, change_latencies, evaluate
 from placerec.hohmm.beliefs import Beliefs
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from helpers.small_world import beliefs_of
 
-from placerec.evaluation import evaluate, format_evaluation
-from placerec.evaluation.summary import shorten
+from placerec.evaluation.metrics import evaluate
+from placerec.evaluation.summary import format_evaluation, shorten
 
 
 def test_the_whole_table_of_a_small_case() -> None:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from helpers.small_experiment import write_grid
 
-from placerec.experiments.grid import read_config
 from placerec.experiments.grid.cells import CellJob, GridCell, believe_cell, describe_data
+from placerec.experiments.grid.config import read_config
 from placerec.experiments.grid.run import run_grid
-from placerec.figures import evaluate_files
+from placerec.figures.evaluation import evaluate_files
 from placerec.hohmm import Beliefs, read_beliefs
 from placerec.methods import decode
 from placerec.model import Decoding, ModelOptions, train_lm

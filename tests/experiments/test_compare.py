@@ -19,7 +19,7 @@ from placerec.experiments.comparison import benchmark
 from placerec.experiments.comparison.benchmark import COMPARED, Benchmark, ComparedMethod, MethodRun
 from placerec.experiments.comparison.results import Comparison
 from placerec.experiments.comparison.run import compare
-from placerec.figures import evaluate_files
+from placerec.figures.evaluation import evaluate_files
 from placerec.vision import Dictionary
 
 for package in ("sklearn", "matplotlib"):

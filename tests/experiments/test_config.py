@@ -6,7 +6,7 @@ import pytest
 from helpers.small_experiment import CONFIG
 
 from placerec.errors import ExperimentError
-from placerec.experiments.grid import read_config
+from placerec.experiments.grid.config import read_config
 
 
 def write(tmp_path: Path, text: str) -> Path:

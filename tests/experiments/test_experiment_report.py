@@ -10,11 +10,14 @@ from helpers.small_experiment import CONFIG, write_grid
 from helpers.small_world import write_images
 from helpers.typed_commands import done, placerec
 
-from placerec.experiments.grid import Config, Results, experiment, report
+from placerec.experiments.grid import report
 from placerec.experiments.grid.cells import GridJob
 from placerec.experiments.grid.claims import CLAIMS
+from placerec.experiments.grid.config import Config
+from placerec.experiments.grid.results import Results
+from placerec.experiments.grid.run import experiment
 from placerec.experiments.grid.tables import markdown, ranked
-from placerec.figures import evaluate_files
+from placerec.figures.evaluation import evaluate_files
 
 IMAGES = """
 [data]

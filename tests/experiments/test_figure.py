@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from helpers.small_experiment import CONFIG, write_grid
 
-from placerec.experiments.grid import read_config
+from placerec.experiments.grid.config import read_config
 from placerec.experiments.grid.figure import draw_figure
 from placerec.experiments.grid.results import Row, SequenceCount, Setting, by_seed
 

@@ -14,8 +14,9 @@ from helpers.small_world import write_images, write_tokens
 
 from placerec.errors import ExperimentError, OutputError, StreamError
 from placerec.experiments import store
-from placerec.experiments.grid import cells, experiment, read_config
-from placerec.experiments.grid.run import run_grid
+from placerec.experiments.grid import cells
+from placerec.experiments.grid.config import read_config
+from placerec.experiments.grid.run import experiment, run_grid
 from placerec.files import held_folder
 from placerec.vision import Dictionary
 
@@ -114,7 +115,7 @@ def test_a_killed_run_goes_on_and_two_processes_give_the_same_bytes(tmp_path: Pa
     # It says when it is half-way, between a partial file and the whole one.
     code = (
         "import time\nfrom pathlib import Path\nimport placerec.files as files\n"
-        "from placerec.experiments.grid import experiment\n"
+        "from placerec.experiments.grid.run import experiment\n"
         "real, written = Path.replace, []\n"
         "def slow(self, target):\n"
         "    written.append(target)\n"

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from placerec.errors import EvaluationError
-from placerec.figures import evaluate_files
+from placerec.figures.evaluation import evaluate_files
 
 HEADER = "frame\ttime\tplace\tword\tselected\tbest\thall\tlab\n"
 RIGHT = HEADER + "0\t0\thall\tw1\t1\thall\t0.9\t0.1\n"

@@ -11,10 +11,9 @@ from helpers.pictures import drawn_texts
 from helpers.small_world import beliefs_of
 
 from placerec.errors import MissingExtraError, OutputError
-from placerec.evaluation import evaluate
-from placerec.figures import plot_evaluation
+from placerec.evaluation.metrics import evaluate
 from placerec.figures.canvas import figure_file, place_colours
-from placerec.figures.evaluation import chosen
+from placerec.figures.evaluation import chosen, plot_evaluation
 from placerec.figures.panels import belief_strip, confusion_panel
 from placerec.hohmm.beliefs import Beliefs
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from placerec.errors import EvaluationError
-from placerec.inspection import decision_page, format_decision, inspect_decision
+from placerec.inspection.decision import decision_page, format_decision, inspect_decision
 
 DECISION: dict[str, Any] = {
     "frame": "t12.5_a",

@@ -13,9 +13,10 @@ from placerec.errors import MissingExtraError, OutputError, VisionError
 from placerec.frames import read_gray
 from placerec.frames.sequence import Gray
 from placerec.frames.table import FrameTable
-from placerec.inspection import show_frame, show_words, stability, word_stability, words
-from placerec.inspection.word_sheet import draw_word_sheet
-from placerec.inspection.word_stability import ChangeResult, Stability, format_stability, plot_stability
+from placerec.inspection import word_stability, words
+from placerec.inspection.frame import show_frame
+from placerec.inspection.word_sheet import draw_word_sheet, show_words
+from placerec.inspection.word_stability import ChangeResult, Stability, format_stability, plot_stability, stability
 from placerec.inspection.words import WordTable
 from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
 

@@ -9,8 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from placerec.errors import OutputError
-from placerec.lab import SCALES, Scale, render_lab
-from placerec.lab.layout import SEQUENCES, render
+from placerec.lab.layout import SCALES, SEQUENCES, Scale, render, render_lab
 from placerec.lab.path import Timing
 from placerec.lab.world import place
 

@@ -12,7 +12,7 @@ import pytest
 from helpers.small_world import run_through, with_columns, write_world
 
 from placerec.errors import ModelError, StreamError
-from placerec.evaluation import evaluate
+from placerec.evaluation.metrics import evaluate
 from placerec.hohmm import Calibration
 from placerec.methods import decode
 from placerec.model import Decoding, calibrate, load_model

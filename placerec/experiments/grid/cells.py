@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from placerec.evaluation import evaluate
-from placerec.evaluation.metrics import change_latencies, right_frames
+from placerec.evaluation.metrics import change_latencies, evaluate, right_frames
 from placerec.experiments.grid.splits import Fold
 from placerec.experiments.store import WordsJob, load, save
 from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition

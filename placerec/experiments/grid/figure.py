@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from placerec.evaluation import Evaluation
+from placerec.evaluation.metrics import Evaluation
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.results import Row, Setting, by_seed
 from placerec.figures.canvas import figure_file, place_colours

@@ -9,7 +9,7 @@ from os.path import relpath
 from pathlib import Path
 
 from placerec.errors import ExperimentError
-from placerec.evaluation import evaluate
+from placerec.evaluation.metrics import evaluate
 from placerec.experiments.grid import tables
 from placerec.experiments.grid.cells import GridCell, GridJob, believe_cell
 from placerec.experiments.grid.claims import judge
