@@ -78,11 +78,6 @@ class Described:
     spec: DescriptorSpec
     kept: Path
 
-    @property
-    def key(self) -> str:
-        """The digest of images and descriptor, 64 hexadecimal digits."""
-        return self.kept.stem
-
     def load(self) -> Descriptors:
         """The descriptors of the frames that could be read, with the times and labels that the sequence has now."""
         arrays, _ = read_npz(self.kept, ("descriptors", "rows"))
@@ -169,14 +164,14 @@ class WordsJob:
     @property
     def words(self) -> Path:
         """The dictionary's file."""
-        key = key_of("words", [one.key for one in self.train], asdict(self.options))
+        key = key_of("words", [one.kept.stem for one in self.train], asdict(self.options))
         return self.cache / "words" / f"{key}.npz"
 
     @property
     def folder(self) -> Path:
         """The token streams' folder."""
         labels = [
-            (one.sequence.name, one.key, [(f.name, repr(f.time), f.place) for f in one.sequence.frames])
+            (one.sequence.name, one.kept.stem, [(f.name, repr(f.time), f.place) for f in one.sequence.frames])
             for one in (*self.train, *self.test)
         ]
         return self.cache / "tokens" / key_of("tokens", self.words.stem, labels)

@@ -76,10 +76,8 @@ def judge(runs: Mapping[str, MethodRun], cost: FrontEndCost, seed: int) -> Compa
 def format_methods(scores: Sequence[MethodScore]) -> str:
     """The text of methods.csv."""
     names = [name for name in MethodScore.__annotations__ if name != "consulted"]
-    lines = [",".join(names)]
-    for score in scores:
-        lines.append(",".join(_cell(name, getattr(score, name)) for name in names))
-    return "\n".join(lines) + "\n"
+    rows = ([_cell(name, getattr(score, name)) for name in names] for score in scores)
+    return "".join(f"{','.join(row)}\n" for row in (names, *rows))
 
 
 def format_pairs(pairs: Sequence[Pair]) -> str:

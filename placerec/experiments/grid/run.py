@@ -3,6 +3,7 @@
 import glob
 import logging
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import product
 from operator import attrgetter
 from pathlib import Path
@@ -74,10 +75,9 @@ def _image_jobs(plan: Config, out: Path, jobs: int, progress: ProgressBar) -> It
     missing = [job for job in todo.values() if not job.made]
     with progress("learn words") as show:
         map_jobs(make_tokens, missing, jobs=jobs, progress=show)
-    for fold in folds:
-        for size, seed in product(plan.size, range(plan.seeds)):
-            images = todo[size, seed, fold.name]
-            yield from _jobs(plan, size, seed, fold, images.folder, out, images)
+    for fold, size, seed in product(folds, plan.size, range(plan.seeds)):
+        images = todo[size, seed, fold.name]
+        yield from _jobs(plan, size, seed, fold, images.folder, out, images)
 
 
 def _token_jobs(plan: Config, out: Path) -> Iterator[GridJob]:
@@ -99,10 +99,9 @@ def _jobs(
     train, test = (tuple(files[name] for name in names) for names in (fold.train, fold.test))
     if not (folder / VOCABULARY).exists():
         raise ExperimentError(f"{folder / VOCABULARY}: no such file; put the vocabulary (all words, one a line) there")
-    content = [
-        [(path.name, content_digest_of_file(path, ExperimentError)) for path in paths] for paths in (train, test)
-    ]
-    vocabulary = content_digest_of_file(folder / VOCABULARY, ExperimentError)
+    digest = partial(content_digest_of_file, error=ExperimentError)
+    content = [[(path.name, digest(path)) for path in paths] for paths in (train, test)]
+    vocabulary = digest(folder / VOCABULARY)
     cells = tuple(GridCell(*values) for values in product(plan.smoothing, plan.order, plan.transition))
     for select in plan.select:
         kept = out / "cache" / "cells" / f"{key_of('cells', content, vocabulary, select)}.json"
