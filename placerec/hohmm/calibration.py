@@ -37,13 +37,9 @@ class Calibration:
         """The calibrated belief (..., C) of each row of `belief` (..., C); rows sum to 1."""
         return normalised(1 / self.temperature * np.log(np.maximum(belief, _SMALLEST_BELIEF)))
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain values for model.json."""
-        return dict(vars(self))
-
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> "Calibration":
-        """What `to_json` gave, further keys aside; ModelError for anything else."""
+        """The calibration with these values, further keys aside; ModelError if they make none."""
         try:
             numbers = [float(values[name]) for name in ("temperature", "log_loss_before", "log_loss_after")]
             frames = int(values["frames"])

@@ -184,8 +184,7 @@ class SequenceDecoder:
             now.updated = now.frame, now.time
             if not now.posterior[2]:
                 self._zero_likelihood_words += 1
-        probability, unknown, _ = now.posterior
-        return Belief(self.places, probability.copy(), word, selected, unknown)
+        return self.belief(word, selected)
 
     def answer(self, word: str, time: float | None = None, distance: float | None = None) -> Belief:
         """The belief after one more frame and its word, which holds the belief if it is not in the vocabulary.

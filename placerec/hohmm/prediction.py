@@ -1,11 +1,9 @@
 """Transitions along one sequence: the prediction of eq. 1 at each of its updates, for whole arrays of beliefs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from math import exp, inf, log
 from operator import mul
-from typing import Protocol
 
 import numpy as np
 
@@ -20,92 +18,59 @@ MIXING = 1e-15
 CHUNK = 1 << 12
 
 
-class TransitionSteps(Protocol):
-    """The prediction at each of T updates."""
-
-    @property
-    def count(self) -> int:
-        """T."""
-
-    @property
-    def mixing(self) -> int:
-        """How many predictions come before the first one that may leave a place MIXING or less; T if there is none."""
-
-    def predict(self, states: Floats, at: slice | Ints) -> None:
-        """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
-
-    def matrices(self, at: slice | Ints) -> Floats:
-        """The matrices (C, C, m) at m of the updates; the first index is the place before."""
-
-
 @dataclass(frozen=True)
-class UniformMixing:
-    """All places change alike: every belief goes towards 1/C; `kept` and `spread` float64 (T,), which sum to 1.
+class TransitionSteps:
+    """The prediction at each of T updates; T is `count`.
 
-    `even`: they are the same for all updates.
+    `mixing`: how many predictions come before the first one that may leave a place MIXING or less; T if there is none.
+    `predict(states, at)`: make of `states` (..., C, m) what they are one prediction later, at m of the updates.
+    `matrices(at)`: the matrices (C, C, m) at m of the updates; the first index is the place before.
     """
 
-    places: int
-    kept: Floats = field(repr=False)
-    spread: Floats = field(repr=False)
-    even: bool
+    count: int
+    mixing: int
+    predict: Callable[[Floats, slice | Ints], None]
+    matrices: Callable[[slice | Ints], Floats]
 
-    @property
-    def count(self) -> int:
-        """The number of updates."""
-        return len(self.spread)
 
-    @property
-    def mixing(self) -> int:
-        """How many predictions come before the first one that may leave a place MIXING or less; T if there is none."""
-        return _leading(self.spread / self.places > MIXING)
+def _uniform_mixing(change: float, places: int, elapsed: Floats) -> TransitionSteps:
+    """All places change alike: every belief goes towards 1/C."""
+    even = bool((elapsed[:1] == elapsed).all())
+    parts = fade(change, elapsed[:1] if even else elapsed)
+    kept, spread = (np.broadcast_to(part, elapsed.shape) for part in parts)
 
-    def predict(self, states: Floats, at: slice | Ints) -> None:
-        """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
+    def predict(states: Floats, at: slice | Ints) -> None:
         # One number for all updates is ten times cheaper than a column of equal ones.
-        kept, spread = (self.kept[:1], self.spread[:1]) if self.even else (self.kept[at], self.spread[at])
+        updates = slice(1) if even else at
         shared = total(states)
-        shared *= spread / self.places
-        states *= kept
+        shared *= spread[updates] / places
+        states *= kept[updates]
         states += shared[..., None, :]
 
-    def matrices(self, at: slice | Ints) -> Floats:
-        """The matrices (C, C, m) at m of the updates; the first index is the place before."""
-        matrices: Floats = np.eye(self.places)[:, :, None] * self.kept[at] + self.spread[at] / self.places
-        return matrices
+    def matrices(at: slice | Ints) -> Floats:
+        found: Floats = np.eye(places)[:, :, None] * kept[at] + spread[at] / places
+        return found
+
+    return TransitionSteps(len(spread), _leading(spread / places > MIXING), predict, matrices)
 
 
-@dataclass(frozen=True)
-class MatrixSteps:
+def _matrix_steps(tables: Floats, which: Ints) -> TransitionSteps:
     """Any transitions: the `tables` float64 (C, C, U) that occur, rows the place before; `which` int64 (T,) is used."""
 
-    tables: Floats = field(repr=False)
-    which: Ints = field(repr=False)
+    def matrices(at: slice | Ints) -> Floats:
+        found: Floats = tables[:, :, which[at]]
+        return found
 
-    @property
-    def count(self) -> int:
-        """The number of updates."""
-        return len(self.which)
-
-    @cached_property
-    def mixing(self) -> int:
-        """How many predictions come before the first one that may leave a place MIXING or less; T if there is none."""
-        return _leading((self.tables.min(axis=(0, 1)) > MIXING)[self.which])
-
-    def predict(self, states: Floats, at: slice | Ints) -> None:
-        """Make of `states` (..., C, m) what they are one prediction later, at m of the updates."""
-        tables = self.tables if self.tables.shape[2] == 1 else self.matrices(at)
+    def predict(states: Floats, at: slice | Ints) -> None:
+        used = tables if tables.shape[2] == 1 else matrices(at)
         before = states.copy()
-        np.multiply(before[..., 0, None, :], tables[0], out=states)
+        np.multiply(before[..., 0, None, :], used[0], out=states)
         product = np.empty_like(states)
-        for i in range(1, len(tables)):
-            np.multiply(before[..., i, None, :], tables[i], out=product)
+        for i in range(1, len(used)):
+            np.multiply(before[..., i, None, :], used[i], out=product)
             states += product
 
-    def matrices(self, at: slice | Ints) -> Floats:
-        """The matrices (C, C, m) at m of the updates; the first index is the place before."""
-        matrices: Floats = self.tables[:, :, self.which[at]]
-        return matrices
+    return TransitionSteps(len(which), _leading((tables.min(axis=(0, 1)) > MIXING)[which]), predict, matrices)
 
 
 def _leading(found: Mask) -> int:
@@ -119,18 +84,14 @@ def transition_steps(transition: Transition, elapsed: Floats, *, backwards: bool
     `backwards`: of evidence from later updates to earlier ones, so with the transposed matrices.
     """
     if transition.change is not None:
-        even = bool((elapsed[:1] == elapsed).all())
-        kept, spread = fade(transition.change, elapsed[:1] if even else elapsed)
-        return UniformMixing(
-            len(transition.matrix), np.broadcast_to(kept, elapsed.shape), np.broadcast_to(spread, elapsed.shape), even
-        )
+        return _uniform_mixing(transition.change, len(transition.matrix), elapsed)
     distinct, which = np.unique(elapsed, return_inverse=True)
     C = len(transition.matrix)
     tables = np.empty((C, C, len(distinct)))
     for u, steps in enumerate(distinct.tolist()):
         matrix = transition.over(steps)
         tables[:, :, u] = matrix.T if backwards else matrix
-    return MatrixSteps(tables, which.reshape(-1))
+    return _matrix_steps(tables, which.reshape(-1))
 
 
 def predict_logs(steps: TransitionSteps, logs: Floats, at: slice | Ints) -> Floats:

@@ -113,7 +113,11 @@ def unknown_model(
     which replace what is derived from `runs`.
     """
     news = runs.runs / runs.frames if runs.frames else 1.0
-    return UnknownModel(vocabulary, news, _distance_model(histograms or (), runs, measured))
+    if not any(histograms or ()):
+        return UnknownModel(vocabulary, news, None)
+    means, variance = _training_distances(histograms or ())
+    shift, spread = measured or (_optimism(runs), variance)
+    return UnknownModel(vocabulary, news, DistanceModel(means + shift, spread + _SHIFT_ERROR**2))
 
 
 def measure_distances(distances: Floats, places: Ints, histograms: Sequence[Histogram]) -> tuple[float, float] | None:
@@ -178,16 +182,6 @@ def _distance_evidence(model: DistanceModel, predicted: Floats, distances: Float
     # Two normal distributions of one variance; beyond half an octave outside their means nothing more is learnt.
     centred = np.clip(outlying - OUTLYING / 2, -OUTLYING, OUTLYING)
     return np.where(usable, centred * OUTLYING / model.variance, 0.0)
-
-
-def _distance_model(
-    histograms: Sequence[Histogram], runs: WordRuns, measured: tuple[float, float] | None
-) -> DistanceModel | None:
-    if not any(histograms):
-        return None
-    means, variance = _training_distances(histograms)
-    shift, spread = measured or (_optimism(runs), variance)
-    return DistanceModel(means + shift, spread + _SHIFT_ERROR**2)
 
 
 def _training_distances(histograms: Sequence[Histogram]) -> tuple[Floats, float]:

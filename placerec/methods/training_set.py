@@ -9,7 +9,7 @@ from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError
 from placerec.lm import BackoffModel
 from placerec.model.folder import PlaceModels
-from placerec.words import Sentences
+from placerec.words import Sentences, read_vocabulary
 
 # The word's index in the vocabulary, and the frames since the selected word before (0 for the first), to a belief (C,).
 StepFunction = Callable[[int, int], Floats]
@@ -78,7 +78,7 @@ def read_training_set(model: PlaceModels) -> TrainingSet:
     record = model.description.record
     return make_training_set(
         model.folder.sentences(record.places),
-        model.folder.words(),
+        read_vocabulary(model.folder.vocabulary),
         delta=model.description.added_count,
         steps=record.transitions,
         triples=record.triples,

@@ -33,14 +33,17 @@ def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decod
         models = load_model(path)
         streams = token_streams(tokens, models)
         _refuse_training(models, dictionary_of(stream_files(tokens)), streams)
-        calibration = fit_calibration(*_judged(models, _decoded(models, streams, options)))
-        models.folder.write(
-            models.description.calibrated(
-                calibration,
-                decoding=describe_decoding(models, options),
-                distances=_measured(models, streams),
-                sequences=[stream.name for stream in streams],
-            )
+        recognizer = make_recognizer(models, options=options)
+        decoded = [recognizer.decode(stream, smooth=options.smooth, lag=options.lag) for stream in streams]
+        calibration = fit_calibration(*_judged(models, decoded))
+        distances = _measured(models, streams)
+        models.description.write(
+            calibration={
+                **vars(calibration),
+                "distances": distances and dict(zip(("shift", "variance"), distances, strict=True)),
+                "options": describe_decoding(models, options),
+                "sequences": [stream.name for stream in streams],
+            }
         )
     losses = calibration.log_loss_before, calibration.log_loss_after
     log.info("%s: temperature %g, log loss %.3f -> %.3f on these frames", model, calibration.temperature, *losses)
@@ -57,11 +60,6 @@ def _refuse_training(models: PlaceModels, maker: TokenMaker | None, streams: Seq
                 f"{stream.name}: trained the {what} of {models.folder}, which is surer of it than of anything new; "
                 "calibrate on labelled sequences that trained neither the words nor the models"
             )
-
-
-def _decoded(models: PlaceModels, streams: Sequence[WordStream], options: Decoding) -> list[Beliefs]:
-    recognizer = make_recognizer(models, options=options)
-    return [recognizer.decode(stream, smooth=options.smooth, lag=options.lag) for stream in streams]
 
 
 def _judged(models: PlaceModels, decoded: Sequence[Beliefs]) -> tuple[Floats, Ints]:

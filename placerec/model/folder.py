@@ -26,7 +26,7 @@ from placerec.lm import BackoffModel, read_arpa
 from placerec.model.options import ModelOptions
 from placerec.model.record import LearnedSequence, Record, Route
 from placerec.version import __version__
-from placerec.words import Selection, Sentences, parse_selection, read_sentences, read_vocabulary
+from placerec.words import Selection, Sentences, parse_selection, read_sentences
 from placerec.words.folder import VOCABULARY
 
 FORMAT = "placerec model 1"
@@ -53,19 +53,9 @@ class ModelFolder:
         return str(self.path)
 
     @property
-    def json(self) -> Path:
-        """The file that describes the model."""
-        return self.path / MODEL_JSON
-
-    @property
     def vocabulary(self) -> Path:
         """The file of all words."""
         return self.path / VOCABULARY
-
-    @property
-    def nonevents(self) -> Path:
-        """The file of words that are no events, for `ngram-count`."""
-        return self.path / "nonevents.txt"
 
     def place(self, place: str) -> PlaceFiles:
         """The files of a place."""
@@ -74,25 +64,6 @@ class ModelFolder:
             self.path / "sentences" / f"{place}.txt",
             self.path / "counts" / f"{place}.counts",
         )
-
-    def check(self) -> None:
-        """Raise ModelError, with the remedy, if there is no such folder."""
-        if self.path.exists() and not self.path.is_dir():
-            raise ModelError(f"{self.path}: is a file, and the folder of a model is expected; name the folder")
-        if not self.path.exists():
-            raise ModelError(f"{self}: no such model folder; `placerec train-lm TOKENS... -o {self}` makes one")
-
-    def read(self) -> "ModelDescription":
-        """What model.json says; ModelError unless everything that decoding uses is there and usable."""
-        return ModelDescription.read(self.json)
-
-    def write(self, description: "ModelDescription") -> None:
-        """Write model.json."""
-        write_text(self.json, _format(dict(description.values), "") + "\n")
-
-    def words(self) -> tuple[str, ...]:
-        """The words of vocab.txt; StreamError for a file that is missing or broken."""
-        return read_vocabulary(self.vocabulary)
 
     def sentences(self, places: Sequence[str]) -> dict[str, Sentences]:
         """The sentences of each place; StreamError for a file that is missing or broken."""
@@ -116,8 +87,11 @@ class PlaceModels:
 def load_model(path: Path | str) -> PlaceModels:
     """Read a MODEL/ folder; ModelError or LanguageModelError, naming the file, for anything missing or broken."""
     folder = ModelFolder(Path(path))
-    folder.check()
-    description = folder.read()
+    if folder.path.exists() and not folder.path.is_dir():
+        raise ModelError(f"{folder}: is a file, and the folder of a model is expected; name the folder")
+    if not folder.path.exists():
+        raise ModelError(f"{folder}: no such model folder; `placerec train-lm TOKENS... -o {folder}` makes one")
+    description = ModelDescription.read(folder.path / MODEL_JSON)
     models = {}
     for place in description.places:
         arpa = folder.place(place).arpa
@@ -165,7 +139,7 @@ class ModelDescription:
     ) -> "ModelDescription":
         """What model.json says of a new model of `words` words, which is not calibrated."""
         return cls(
-            folder.json,
+            folder.path / MODEL_JSON,
             {
                 "format": FORMAT,
                 "version": __version__,
@@ -243,11 +217,6 @@ class ModelDescription:
         return None if distances is None else [distances[place] for place in self.places]
 
     @property
-    def is_calibrated(self) -> bool:
-        """Whether there is a calibration, usable or not."""
-        return self.values.get("calibration") is not None
-
-    @property
     def calibration(self) -> tuple[Calibration, Mapping[str, Any]] | None:
         """The calibration and the decoding that it was fitted for, None without one."""
         stored = self._stored()
@@ -274,25 +243,9 @@ class ModelDescription:
             raise ModelError(f"{self.path}: the calibration's distances are no shift and variance; {_RECALIBRATE}")
         return shift, variance
 
-    def calibrated(
-        self,
-        calibration: Calibration,
-        *,
-        decoding: Mapping[str, Any],
-        distances: tuple[float, float] | None,
-        sequences: Sequence[str],
-    ) -> "ModelDescription":
-        """The description with a calibration in place of the one before.
-
-        `decoding`: what it was fitted for. `distances`: shift and variance of log2 distance. `sequences`: their names.
-        """
-        entry = {
-            **calibration.to_json(),
-            "distances": distances and dict(zip(("shift", "variance"), distances, strict=True)),
-            "options": decoding,
-            "sequences": list(sequences),
-        }
-        return ModelDescription(self.path, {**self.values, "calibration": entry})
+    def write(self, **changed: Any) -> None:
+        """Write model.json, with `changed` values in place of those before."""
+        write_text(self.path, _format({**self.values, **changed}, "") + "\n")
 
     def _stored(self) -> Mapping[str, Any] | None:
         stored = self.values.get("calibration")

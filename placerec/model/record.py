@@ -67,9 +67,6 @@ class Record:
         return table
 
 
-NO_RECORD = Record()
-
-
 def record_streams(streams: Iterable[tuple[WordStream, Mapping[str, Sentences]]], dictionary: str | None) -> Record:
     """The record of token streams, each with its sentences per place; one stream at a time is in memory."""
     learned: list[LearnedSequence] = []

@@ -23,7 +23,7 @@ from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.model.corpus import gather_corpus
 from placerec.model.folder import OWNED, ModelDescription, ModelFolder
 from placerec.model.options import ModelOptions
-from placerec.model.record import NO_RECORD, Record
+from placerec.model.record import Record
 from placerec.words import Sentences, each_sentence, format_sentences, write_vocabulary
 
 NO_PLACE = "no labelled frame found: label the frames (places.lst, or one folder per place) to train"
@@ -65,7 +65,8 @@ def train_lm(
         if not record.places:
             raise ModelError(NO_PLACE)
         texts = {place: each_sentence(folder.place(place).sentences) for place in record.places}
-        _write_model(folder, texts, words, options, record, work, progress)
+        counts = _counted(texts.values(), words, options, work)
+        write_model(folder, record.places, record.places, counts, words, options, record, progress)
     log.info("%s: %d places, order %d, %s", out, len(texts), options.order, options.smoothing)
 
 
@@ -75,7 +76,7 @@ def train_model(
     out: Path | str,
     *,
     options: ModelOptions = ModelOptions(),
-    record: Record = NO_RECORD,
+    record: Record = Record(),
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
@@ -90,26 +91,8 @@ def train_model(
         folder = ModelFolder(path)
         for place, text in sentences.items():
             write_text(folder.place(place).sentences, format_sentences(text))
-        _write_model(folder, sentences, vocabulary, options, record, work, progress)
-
-
-def _write_model(
-    folder: ModelFolder,
-    sentences: Mapping[str, Iterable[Sequence[str]]],
-    vocabulary: Sequence[str],
-    options: ModelOptions,
-    record: Record,
-    work: Executor | None,
-    progress: Progress | None,
-) -> None:
-    """What MODEL/ holds beside the files of sentences, which are there."""
-    begin_model(folder, vocabulary, options)
-    tables = _counted(sentences.values(), vocabulary, options, work)
-    for done, (place, counts) in enumerate(zip(sentences, tables, strict=True), start=1):
-        write_place(folder, place, counts, vocabulary, options)
-        if progress:
-            progress(done, len(sentences))
-    folder.write(ModelDescription.of(folder, list(sentences), len(vocabulary), options, record))
+        counts, places = _counted(sentences.values(), vocabulary, options, work), list(sentences)
+        write_model(folder, places, places, counts, vocabulary, options, record, progress)
 
 
 def _counted(
@@ -121,28 +104,38 @@ def _counted(
     return (count_ngrams(text, order, vocabulary=vocabulary, markers=markers) for text in texts)
 
 
-def begin_model(folder: ModelFolder, vocabulary: Sequence[str], options: ModelOptions) -> None:
-    """Write into a new MODEL/ folder what does not depend on the places."""
+def write_model(
+    folder: ModelFolder,
+    places: Sequence[str],
+    estimated: Sequence[str],
+    counts: Iterable[NgramCounts],
+    vocabulary: Sequence[str],
+    options: ModelOptions,
+    record: Record,
+    progress: Progress | None,
+) -> None:
+    """Write what MODEL/ holds beside the files of sentences, which are there when the counts of a place are.
+
+    `estimated`: which `places` get new models, of their `counts`; those of the others come from elsewhere.
+    """
     for name in ("sentences", "counts"):
         (folder.path / name).mkdir(exist_ok=True)
     write_vocabulary(vocabulary, folder.vocabulary)
     if not options.markers:
-        write_text(folder.nonevents, SENTENCE_END + "\n")
-
-
-def write_place(
-    folder: ModelFolder, place: str, counts: NgramCounts, vocabulary: Sequence[str], options: ModelOptions
-) -> None:
-    """Write into MODEL/, beside the sentences of one place, their counts, and the model of these."""
-    files = folder.place(place)
-    if not files.sentences.stat().st_size:
-        log.warning("place %s: no visit holds a selected word; its model is uniform", place)
-    try:
-        model = estimate_place(counts, options)
-    except LanguageModelError as error:
-        raise LanguageModelError(f"place {place}: {error}") from error
-    write_text(files.counts, format_counts(counts))
-    write_arpa(model, files.arpa, comment=options.signature(place, len(vocabulary)))
+        write_text(folder.path / "nonevents.txt", SENTENCE_END + "\n")
+    for done, (counted, place) in enumerate(zip(counts, estimated, strict=True), start=1):
+        files = folder.place(place)
+        if not files.sentences.stat().st_size:
+            log.warning("place %s: no visit holds a selected word; its model is uniform", place)
+        try:
+            model = estimate_place(counted, options)
+        except LanguageModelError as error:
+            raise LanguageModelError(f"place {place}: {error}") from error
+        write_text(files.counts, format_counts(counted))
+        write_arpa(model, files.arpa, comment=options.signature(place, len(vocabulary)))
+        if progress:
+            progress(done, len(estimated))
+    ModelDescription.of(folder, places, len(vocabulary), options, record).write()
 
 
 def _check(sentences: Mapping[str, Sentences], vocabulary: Sequence[str], options: ModelOptions) -> None:

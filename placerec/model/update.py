@@ -6,7 +6,7 @@ models of their places are estimated again; the files of other places stay as th
 
 import logging
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, chain, pairwise
 from pathlib import Path
@@ -15,6 +15,7 @@ from placerec.errors import LanguageModelError, ModelError, StreamError
 from placerec.files import held_folder, read_text, restore_folder, whole_folder, write_text
 from placerec.frames.naming import with_parent
 from placerec.frames.places import check_twins
+from placerec.jobs import Progress
 from placerec.lm import NgramCounts, count_ngrams
 from placerec.lm.counts import add_counts, read_counts, subtract_counts
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, Vocabulary
@@ -22,8 +23,8 @@ from placerec.model.corpus import Corpus, holds_sentences, read_corpus
 from placerec.model.folder import MODEL_JSON, OWNED, ModelDescription, ModelFolder
 from placerec.model.options import ModelOptions
 from placerec.model.record import Record, add_record, take_away
-from placerec.model.train import begin_model, write_place
-from placerec.words import format_sentences
+from placerec.model.train import write_model
+from placerec.words import format_sentences, read_vocabulary
 from placerec.words.folder import check_dictionary, stream_files
 from placerec.words.stream import stream_name
 
@@ -48,7 +49,7 @@ def update(
     tokens: Sequence[Path | str],
     *,
     forget: bool = False,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """`placerec update`: add the labelled visits in `tokens` to a MODEL/ folder, or take them away to `forget` them.
 
@@ -74,18 +75,17 @@ def update(
         changed = [place for place in record.places if new.sentences.get(place) or place not in former]
         with whole_folder(path, OWNED) as made:
             folder = ModelFolder(made)
-            begin_model(folder, old.vocabulary, old.options)
-            for place in set(record.places) - set(changed):
-                for source, target in zip(old.folder.place(place), folder.place(place), strict=True):
-                    shutil.copyfile(source, target)
-            for done, place in enumerate(changed, start=1):
-                lines, counts = _forgotten(old, new, place) if forget else _learned(old, new, place)
-                write_text(folder.place(place).sentences, "".join(lines))
-                write_place(folder, place, counts, old.vocabulary, old.options)
-                if progress:
-                    progress(done, len(changed))
-            words = len(old.vocabulary)
-            folder.write(ModelDescription.of(folder, record.places, words, old.options, record))
+
+            def counted() -> Iterator[NgramCounts]:
+                for place in set(record.places) - set(changed):
+                    for source, target in zip(old.folder.place(place), folder.place(place), strict=True):
+                        shutil.copyfile(source, target)
+                for place in changed:
+                    lines, counts = _forgotten(old, new, place) if forget else _learned(old, new, place)
+                    write_text(folder.place(place).sentences, "".join(lines))
+                    yield counts
+
+            write_model(folder, record.places, changed, counted(), old.vocabulary, old.options, record, progress)
     if old.calibrated:
         log.warning("%s: the calibration was of the former model, and is dropped; calibrate again", path)
     verb, names = "forgotten" if forget else "learned", ", ".join(new.record.names)
@@ -95,12 +95,13 @@ def update(
 def _read_model(path: Path) -> _Model:
     """What a MODEL/ folder says of itself, if its visits can be told apart and none of its files is missing."""
     folder = ModelFolder(path)
-    description = folder.read()
+    description = ModelDescription.read(path / MODEL_JSON)
     record = description.record
     for file in (file for place in record.places for file in folder.place(place)):
         if not file.is_file():
             raise ModelError(f"{file}: missing, though {MODEL_JSON} names visits to its place; train the model again")
-    return _Model(folder, description.options, folder.words(), record, description.is_calibrated)
+    calibrated = description.values.get("calibration") is not None
+    return _Model(folder, description.options, read_vocabulary(folder.vocabulary), record, calibrated)
 
 
 def _read_visits(tokens: Sequence[Path | str], old: _Model) -> Corpus:
