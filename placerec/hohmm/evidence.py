@@ -115,13 +115,9 @@ def evidence_in(
         selected[known[part]] = select(words, selection)
         at = part[selected]
         log10_likelihoods = emissions.score([stream.words[i] for i in at.tolist()])
-        yield Evidence(selected, at, log10_likelihoods, _elapsed(at, stream.times, per))
-
-
-def _elapsed(at: Ints, times: Floats, per: str) -> Floats:
-    """Steps since the update before, for updates at the frames `at` (U,); 0 for the first."""
-    stamps = {"update": np.arange(len(at)), "frame": at, "second": times[at]}[per]
-    return np.diff(stamps, prepend=stamps[:1]).astype(np.float64)
+        stamps = {"update": np.arange(len(at)), "frame": at, "second": stream.times[at]}[per]
+        elapsed = np.diff(stamps, prepend=stamps[:1]).astype(np.float64)
+        yield Evidence(selected, at, log10_likelihoods, elapsed)
 
 
 def _check_times(stream: WordStream) -> None:

@@ -20,9 +20,8 @@ import numpy as np
 from placerec.arrays import Floats, Ints
 from placerec.hohmm import unknown
 from placerec.hohmm.evidence import Evidence
-from placerec.hohmm.filter import filter_stream
-from placerec.hohmm.posterior import unknown_ratios
-from placerec.hohmm.prediction import CHUNK, predicted_beliefs, transition_steps
+from placerec.hohmm.posterior import beliefs_around, unknown_ratios
+from placerec.hohmm.prediction import CHUNK, transition_steps
 from placerec.hohmm.transitions import Transition
 from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel
@@ -79,7 +78,7 @@ def explain_part(
     unknown: UnknownModel | None,
 ) -> Iterator[Decision]:
     """What decided after each selected word of a part of a stream; `models` of the places, in order."""
-    before, after = _beliefs(part.log10_likelihoods, transition, part.elapsed)
+    before, after = beliefs_around(part.log10_likelihoods, transition, part.elapsed)
     news = None if unknown is None else _news(part, transition, unknown, stream.distances[part.at])
     return _decisions(part, stream, models, transition, before, after, news)
 
@@ -152,16 +151,11 @@ def contributions(part: Evidence, transition: Transition, before: Floats, after:
     return found
 
 
-def _beliefs(log10_likelihoods: Floats, transition: Transition, elapsed: Floats) -> tuple[Floats, Floats]:
-    after = filter_stream(log10_likelihoods, transition, elapsed).belief
-    return predicted_beliefs(after, transition, elapsed), after
-
-
 def _news(part: Evidence, transition: Transition, model: UnknownModel, distances: Floats) -> Floats:
     """Per selected word what it says of a new place, log10, and the probability of that before and after: (U, 3)."""
     ratios = unknown_ratios(part, transition, model, distances)
     places = part.log10_likelihoods.shape[1]
-    before, after = _beliefs(unknown.chain_evidence(ratios, places), unknown.CHAIN, part.elapsed)
+    before, after = beliefs_around(unknown.chain_evidence(ratios, places), unknown.CHAIN, part.elapsed)
     before[:1, 0], _ = unknown.prior(places)
     return np.stack([ratios / math.log(10), before[:, 0], after[:, 0]], axis=1)
 

@@ -138,9 +138,14 @@ def unknown_posterior(
 
 def unknown_ratios(evidence: Evidence, transition: Transition, model: UnknownModel, distances: Floats) -> Floats:
     """What each selected word says of a new place, float64 (U,): `unknown.evidence` beside the filter of the places."""
-    log10_likelihoods, elapsed = evidence.log10_likelihoods, evidence.elapsed
-    predicted = predicted_beliefs(filter_stream(log10_likelihoods, transition, elapsed).belief, transition, elapsed)
-    return unknown.evidence(model, log10_likelihoods, predicted, distances)
+    predicted, _ = beliefs_around(evidence.log10_likelihoods, transition, evidence.elapsed)
+    return unknown.evidence(model, evidence.log10_likelihoods, predicted, distances)
+
+
+def beliefs_around(log10_likelihoods: Floats, transition: Transition, elapsed: Floats) -> tuple[Floats, Floats]:
+    """The filter's beliefs just before and after each of T words, float64 (T, C) both."""
+    after = filter_stream(log10_likelihoods, transition, elapsed).belief
+    return predicted_beliefs(after, transition, elapsed), after
 
 
 def most_probable_path(evidence: Evidence, transition: Transition) -> Ints:

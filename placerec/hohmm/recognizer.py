@@ -4,7 +4,7 @@ import logging
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -29,15 +29,6 @@ if TYPE_CHECKING:
     from placerec.vision import Dictionary
 
 log = logging.getLogger(__name__)
-
-
-class _Decoded(NamedTuple):
-    """Of n frames: beliefs (n, C), the place of each (n,), what is unknown (n,) or empty; words of probability 0."""
-
-    belief: Floats
-    best: Ints
-    unknown: Floats
-    zero_likelihood_words: int
 
 
 class Recognizer(SequenceDecoder):
@@ -174,17 +165,16 @@ class Recognizer(SequenceDecoder):
         decoded = [self._decoded(part, stream, smooth=smooth, viterbi=viterbi, lag=lag) for part in parts]
         if len(parts) > 1:
             log.info("%s: gaps of more than %g s: %d", stream.name, self.max_gap, len(parts) - 1)
-        never = sum(part.zero_likelihood_words for part in decoded)
-        if never:
+        belief, best, unknown, zero_likelihood_words = zip(*decoded, strict=True)
+        if never := sum(zero_likelihood_words):
             log.warning("%s: words that no place explains: %d left the prediction as it was", stream.name, never)
-        unknown = None if self.unknown is None else np.concatenate([part.unknown for part in decoded])
         return Beliefs.of(
             stream,
             self.places,
-            np.concatenate([part.belief for part in decoded]),
+            np.concatenate(belief),
             selected=np.concatenate([part.selected for part in parts]),
-            best=np.concatenate([part.best for part in decoded]),
-            unknown=unknown,
+            best=np.concatenate(best),
+            unknown=None if self.unknown is None else np.concatenate(unknown),
         )
 
     def evidence(self, stream: WordStream) -> Iterator[Evidence]:
@@ -193,7 +183,10 @@ class Recognizer(SequenceDecoder):
             stream, self.emissions, self._words, selection=self.selection, per=self._per, max_gap=self.max_gap
         )
 
-    def _decoded(self, part: Evidence, stream: WordStream, *, smooth: bool, viterbi: bool, lag: int | None) -> _Decoded:
+    def _decoded(
+        self, part: Evidence, stream: WordStream, *, smooth: bool, viterbi: bool, lag: int | None
+    ) -> tuple[Floats, Ints, Floats, int]:
+        """Of n frames: beliefs (n, C), the place of each (n,), unknown (n,) or empty; words of probability 0."""
         belief, never = posterior(part, self.transition, smooth=smooth, lag=lag)
         best = most_probable_path(part, self.transition) if viterbi else belief.argmax(axis=1)
         if self.calibration is not None:
@@ -202,4 +195,4 @@ class Recognizer(SequenceDecoder):
         if self.unknown is not None:
             far = stream.distances[part.at]
             unknown = unknown_posterior(part, self.transition, self.unknown, far, smooth=smooth, lag=lag)
-        return _Decoded(belief, best, unknown, never)
+        return belief, best, unknown, never

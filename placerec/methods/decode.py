@@ -9,17 +9,8 @@ from pathlib import Path
 from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import number_in, whole_folder, write_text
 from placerec.frames import SourceOptions
-from placerec.hohmm import (
-    Belief,
-    BeliefRow,
-    Beliefs,
-    Recognizer,
-    SequenceDecoder,
-    format_beliefs,
-    format_header,
-    format_json_row,
-    format_row,
-)
+from placerec.hohmm import Belief, Recognizer, SequenceDecoder
+from placerec.hohmm.beliefs import BeliefRow, Beliefs, format_beliefs, format_header, format_json_row, format_row
 from placerec.hohmm.explain import EXPLAINED
 from placerec.jobs import Progress
 from placerec.methods.decoders import HOHMM, make_decoder

@@ -10,7 +10,8 @@ import numpy as np
 
 from placerec.arrays import Floats
 from placerec.errors import ModelError
-from placerec.hohmm import Emissions, Posterior, SequenceDecoder, TakeIn
+from placerec.hohmm.decoder import Posterior, SequenceDecoder, TakeIn
+from placerec.hohmm.evidence import Emissions
 from placerec.methods import (
     dubois2011,
     filliat2008,
@@ -143,7 +144,7 @@ def make_decoder(
     return StepDecoder(
         training,
         fit(training),
-        selection=model.selection,
+        selection=model.description.selection,
         max_gap=options.max_gap,
         dictionary=dictionary,
         unknown=options.unknown,

@@ -19,13 +19,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Mask
 from placerec.hohmm import Transition, filter_stream, learned_transition
 from placerec.lm.logs import LN10
-from placerec.methods.descriptors import (
-    DescriptorTrainingSet,
-    MakePointStepper,
-    filtered,
-    held_out_folds,
-    scattered,
-)
+from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper, filtered, held_out_folds, scattered
 
 PROTOTYPES = 100
 # Widths that are tried, in units of the root mean square distance of the training frames from their mean. Wide ones

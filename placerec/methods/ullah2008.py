@@ -17,13 +17,7 @@ from placerec.arrays import Floats, Mask
 from placerec.errors import check_optional
 from placerec.hohmm import fit_calibration, learned_transition
 from placerec.hohmm.filter import normalised
-from placerec.methods.descriptors import (
-    DescriptorTrainingSet,
-    MakePointStepper,
-    filtered,
-    held_out_folds,
-    scattered,
-)
+from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper, filtered, held_out_folds, scattered
 
 # The margin of a place that a fold of the training does not have: below any that occurs, and finite.
 _ABSENT = -20.0

@@ -8,14 +8,7 @@ from pathlib import Path
 from placerec.errors import StreamError
 from placerec.frames.places import check_place, check_twins
 from placerec.model.record import LearnedSequence, Record, record_streams
-from placerec.words import (
-    Selection,
-    Sentences,
-    WordStream,
-    each_sentence,
-    read_vocabulary,
-    sentences_per_place,
-)
+from placerec.words import Selection, Sentences, WordStream, each_sentence, read_vocabulary, sentences_per_place
 from placerec.words.folder import VOCABULARY, dictionary_of, each_stream, find_vocabulary, is_stream, stream_files
 from placerec.words.stream import locate
 

@@ -8,17 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from placerec.errors import ModelError
-from placerec.hohmm import (
-    Calibration,
-    Emissions,
-    Recognizer,
-    SeparateEmissions,
-    Transition,
-    fixed_transition,
-    learned_transition,
-    read_transitions,
-)
-from placerec.hohmm.evidence import MARKERS
+from placerec.hohmm import Calibration, Recognizer
+from placerec.hohmm.evidence import MARKERS, Emissions, SeparateEmissions
+from placerec.hohmm.transitions import Transition, fixed_transition, learned_transition, read_transitions
 from placerec.hohmm.unknown import UnknownModel, unknown_model, word_runs
 from placerec.lm.check import kenlm_scorer
 from placerec.model.folder import PlaceModels, load_model
@@ -169,7 +161,7 @@ def make_recognizer(
         raise ModelError(f"scorer {scorer!r} is unknown; choose native or kenlm")
     return Recognizer(
         model.models,
-        selection=model.selection,
+        selection=model.description.selection,
         transition=transition_of(model, options),
         dictionary=dictionary,
         max_gap=options.max_gap,

@@ -78,11 +78,6 @@ class PlaceModels:
     models: Mapping[str, BackoffModel] = field(repr=False)
     description: "ModelDescription" = field(repr=False)
 
-    @property
-    def selection(self) -> Selection:
-        """Which words of a stream were counted, and are decoded."""
-        return self.description.selection
-
 
 def load_model(path: Path | str) -> PlaceModels:
     """Read a MODEL/ folder; ModelError or LanguageModelError, naming the file, for anything missing or broken."""

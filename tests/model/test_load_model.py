@@ -30,7 +30,7 @@ def test_a_model_is_read_back(world: Path) -> None:
     model = load_model(world / "model")
     assert list(model.models) == list(PLACES)
     assert {one.order for one in model.models.values()} == {3}
-    assert model.selection == Selection("compress", 2)
+    assert model.description.selection == Selection("compress", 2)
     assert load_recognizer(world / "model").places == PLACES
 
 
