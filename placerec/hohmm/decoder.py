@@ -184,7 +184,9 @@ class SequenceDecoder:
             now.updated = now.frame, now.time
             if not now.posterior[2]:
                 self._zero_likelihood_words += 1
-        return self.belief(word, selected)
+        # As `belief` does; a call more would be felt on-line.
+        probability, unknown, _ = now.posterior
+        return Belief(self.places, probability.copy(), word, selected, unknown)
 
     def answer(self, word: str, time: float | None = None, distance: float | None = None) -> Belief:
         """The belief after one more frame and its word, which holds the belief if it is not in the vocabulary.
@@ -200,10 +202,10 @@ class SequenceDecoder:
         self._pass(time, needed=False)
         return self.belief()
 
-    def belief(self, word: str = "", selected: bool = False) -> Belief:
+    def belief(self) -> Belief:
         """The belief as it stands."""
         probability, unknown, _ = self._now.posterior
-        return Belief(self.places, probability.copy(), word, selected, unknown)
+        return Belief(self.places, probability.copy(), "", False, unknown)
 
     def decode(self, stream: WordStream) -> Beliefs:
         """The beliefs over a whole sequence: those that `answer` gives from a reset, which later words never change.
