@@ -80,12 +80,12 @@ for command in (
     lab,
     experiment,
     demo,
+    show_words,
+    show_frame,
+    stability,
+    *SRILM_COMMANDS,
 ):
     commands.add_command(command)
-for command in (show_words, show_frame, stability):
-    commands.add_command(command)
-for tool in SRILM_COMMANDS:
-    commands.add_command(tool)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

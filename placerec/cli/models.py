@@ -164,7 +164,10 @@ def inspect(path: Path, asked: tuple[str, ...], top: int, as_json: bool, out: Pa
     else:
         if out is not None:
             raise click.UsageError("-o is for the page of a decision (NAME.explain.jsonl FRAME); leave it out")
-        found, text = _model(path, asked, top)
+        from placerec.lm.inspect import format_inspection, inspect_model
+
+        found = inspect_model(path, asked, top=top)
+        text = format_inspection(found)
     echo_json(found) if as_json else click.echo(text)
 
 
@@ -177,13 +180,6 @@ def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[obj
         raise click.UsageError(f"name one frame of {path}, as in its column `frame` of the beliefs")
     decision = inspect_decision(path, asked[0], out=out)
     return decision, format_decision(decision)
-
-
-def _model(path: Path, asked: tuple[str, ...], top: int) -> tuple[object, str]:
-    from placerec.lm.inspect import format_inspection, inspect_model
-
-    inspection = inspect_model(path, asked, top=top)
-    return inspection, format_inspection(inspection)
 
 
 @click.command(epilog="Example: placerec check model/*.arpa")

@@ -21,9 +21,10 @@ def merge_weight(weights: Sequence[float], k: int) -> float:
 
 def merge(model: MutableModel, other: MutableModel, weight: float, trace: Trace = SILENT) -> None:
     """Section 11.4: mix `other`, over the same trie, into `model`, whose share is `weight`."""
-    mixed: list[Singles] = []
-    for n in range(1, model.order + 1):
-        mixed.append(_mix(model.backed_off(n), other.backed_off(n), weight))
+    mixed = [
+        log10(weight * p_of(model.backed_off(n)) + (1 - weight) * p_of(other.backed_off(n)))
+        for n in range(1, model.order + 1)
+    ]
     for n in range(model.order, 0, -1):
         new = np.flatnonzero(other.stored[n - 1] & ~model.stored[n - 1])
         model.stored[n - 1][new] = True
@@ -32,10 +33,6 @@ def merge(model: MutableModel, other: MutableModel, weight: float, trace: Trace 
         stored = model.stored[n - 1]
         model.log10_p[n - 1][stored] = mixed[n - 1][stored]
     reweigh(model, trace)
-
-
-def _mix(a: Singles, b: Singles, weight: float) -> Singles:
-    return log10(weight * p_of(a) + (1 - weight) * p_of(b))
 
 
 def mixed(log10_probs: Singles, weights: Floats) -> Singles:

@@ -204,7 +204,9 @@ def weigh_contexts(model: MutableModel, n: int, trace: Trace, *, minimum: float 
     if n == 1:
         left = float(1 - p_of(model.log10_p[0][rows]).sum())
         if minimum is not None and 0 - left > EPSILON:
-            left = _scale_unigrams(model, rows, left, trace)
+            trace.scarce_contexts(1, np.zeros(1, np.int64), np.array([left]), 0.0)
+            model.log10_p[0][rows] += np.float32(-np.log10(1 - left))
+            left = 0.0
         left = 0.0 if abs(left) < EPSILON else left
         if left < 0:
             trace.overfull_contexts(1, np.zeros(1, np.int64), np.array([left]))
@@ -268,12 +270,6 @@ def _keep_minimum(
         scale = np.where(scarce, np.log10(1 - minimum) - np.log10(1 - np.where(scarce, num, 0)), 0).astype(np.float32)
         model.log10_p[n - 1][rows] += scale[group]
     return np.where(scarce, minimum, num)
-
-
-def _scale_unigrams(model: MutableModel, rows: Ints, left: float, trace: Trace) -> float:
-    trace.scarce_contexts(1, np.zeros(1, np.int64), np.array([left]), 0.0)
-    model.log10_p[0][rows] += np.float32(-np.log10(1 - left))
-    return 0.0
 
 
 def spread_unigram_mass(model: MutableModel, mass: float, trace: Trace) -> None:
