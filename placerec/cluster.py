@@ -76,10 +76,10 @@ def _quiet() -> Iterator[Any]:
     check_optional("distributed", "--cluster")
     import distributed
 
-    names = {*_TALKERS, *logging.root.manager.loggerDict}
-    levels = {name: logging.getLogger(name).level for name in names if name.partition(".")[0] in _TALKERS}
-    for name in levels:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    loggers = [logging.getLogger(name) for name in {*_TALKERS, *logging.root.manager.loggerDict} if _talks(name)]
+    levels = [(logger, logger.level) for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", module=r"distributed|dask|tornado")
@@ -87,8 +87,12 @@ def _quiet() -> Iterator[Any]:
             warnings.filterwarnings("ignore", "Sending large graph")
             yield distributed
     finally:
-        for name, level in levels.items():
-            logging.getLogger(name).setLevel(level)
+        for logger, level in levels:
+            logger.setLevel(level)
+
+
+def _talks(name: str) -> bool:
+    return name.partition(".")[0] in _TALKERS
 
 
 @contextmanager

@@ -46,7 +46,7 @@ class Camera:
     @property
     def path(self) -> Path:
         """What frames and messages name it by: no password of an address, and no slashes that a path would lose."""
-        return Path(str(self))
+        return Path(PREFIX + re.sub(r"//[^/@]*@", "//", self.source))
 
     @property
     def name(self) -> str:

@@ -17,7 +17,7 @@ from placerec.version import __version__
 from placerec.vision.chunks import Source, chunks, first_unusable, spooled
 from placerec.vision.describe import Descriptors
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
-from placerec.vision.som import RULES, WIDTH, MapQuality, Units, map_quality, nearest_units, train_som
+from placerec.vision.som import RULES, WIDTH, EpochProgress, MapQuality, Units, map_quality, nearest_units, train_som
 from placerec.vision.spec import DescriptorSpec, descriptor
 from placerec.vision.storage import Arrays, fingerprint, read_npz, write_npz
 
@@ -110,14 +110,16 @@ class Dictionary:
         *,
         spec: DescriptorSpec,
         options: DictionaryOptions = DictionaryOptions(),
+        progress: EpochProgress | None = None,
         work: Executor | None = None,
     ) -> "Dictionary":
         """Learn size x size words from descriptors (n, spec.length) in time order (readings A25-A29).
 
         `descriptors`: an array, a memory map, or a function that gives an iterator over float32 pieces of any length
-        and is called three times: the memory then does not grow with n but for four bytes a frame. `work`: whose other
-        machines, if any, take a share of the sums (`cluster.cluster`). The bytes that `save` writes depend on
-        descriptors and options alone, whoever does the work. Raises VisionError for unusable descriptors.
+        and is called three times: the memory then does not grow with n but for four bytes a frame. `progress`: called
+        with epoch, epochs and quantisation error. `work`: whose other machines, if any, take a share of the sums
+        (`cluster.cluster`). The bytes that `save` writes depend on descriptors and options alone, whoever does the
+        work. Raises VisionError for unusable descriptors.
         """
         size = options.size
         rng = np.random.Generator(np.random.PCG64(options.seed))
@@ -132,7 +134,15 @@ class Dictionary:
             log.warning("%d frames cannot fill the %d words of a map of size %d", data.n, size * size, size)
         # A fifth of the descriptors, for many passes.
         with spooled(projected(source, pca), work) as codes:
-            som = train_som(codes, size, rng=rng, rule=options.rule, width=options.width, epochs=options.epochs)
+            som = train_som(
+                codes,
+                size,
+                rng=rng,
+                rule=options.rule,
+                width=options.width,
+                epochs=options.epochs,
+                progress=progress,
+            )
             got = map_quality(codes, som.codebook, som.hits)
         errors = got.quantisation_error, got.topographic_error, got.entropy, got.dead
         quality = Quality(frames or data.n, data.n, som.epochs, pca.explained, pca.needed, *errors)

@@ -1,5 +1,6 @@
 """Self-organising maps on a square lattice, row-major: training, the search for best units (readings A28), quality."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,6 +12,8 @@ from scipy.sparse import csc_array
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.errors import VisionError
 from placerec.vision.chunks import CHUNK, Source, check_again, chunks, each_chunk
+
+EpochProgress = Callable[[int, int, float], None]  # epoch (from 1), epochs, quantisation error
 
 RULES = ("batch", "online")
 EPOCHS = 50
@@ -60,6 +63,7 @@ def train_som(
     rule: str = "batch",
     width: float = WIDTH,
     epochs: int | None = None,
+    progress: EpochProgress | None = None,
 ) -> Som:
     """Train size x size units on PCA coordinates (n, k), largest variance first, from memory or streamed.
 
@@ -76,7 +80,7 @@ def train_som(
     n, mean, deviation = _spread(source)
     codebook = _start(mean, deviation, size, rng)
     learn = {"batch": _batch, "online": _online}[rule]
-    codebook, epochs = learn(source, n, codebook, rng, width, epochs)
+    codebook, epochs = learn(source, n, codebook, rng, width, epochs, progress)
     hits = np.zeros(size * size, np.int64)
     for counts in each_chunk(source)(partial(_hits, Units.of(codebook))):
         hits += counts
@@ -89,19 +93,35 @@ def _hits(units: Units, rows: Singles) -> Ints:
     return np.bincount(_search(rows, units), minlength=len(units.places))
 
 
-def _share(ready: Units, rows: Singles) -> tuple[NDArray[np.unsignedinteger[Any]], Floats]:
+@dataclass(frozen=True, eq=False)
+class _Share:
     """What an epoch takes from a chunk of m rows: the unit of each (m,), in the smallest type that holds it.
 
-    And float64 (h, k), the sums of the rows of each unit that has some, in the units' order.
+    sums: float64 (h, k), the sums of the rows of each unit that has some, in the units' order. distance: of all rows
+    to their units.
     """
+
+    units: NDArray[np.unsignedinteger[Any]]
+    sums: Floats
+    distance: float
+
+
+def _share(ready: Units, measured: bool, rows: Singles) -> _Share:
     units = _search(rows, ready)
     count = len(ready.places)
     sums = _unit_sums(rows, units, count)[np.bincount(units, minlength=count) > 0]
-    return units.astype(np.min_scalar_type(count)), sums
+    distance = float(distances(rows, ready.places, units).sum()) if measured else 0.0
+    return _Share(units.astype(np.min_scalar_type(count)), sums, distance)
 
 
 def _batch(
-    source: Source, n: int, codebook: Singles, rng: np.random.Generator, width: float, epochs: int
+    source: Source,
+    n: int,
+    codebook: Singles,
+    rng: np.random.Generator,
+    width: float,
+    epochs: int,
+    progress: EpochProgress | None,
 ) -> tuple[Singles, int]:
     """The codebook after at most `epochs` passes, and the number of passes that moved it."""
     cooling = (epochs + 1) // 2
@@ -110,26 +130,35 @@ def _batch(
     each = each_chunk(source)
     for epoch in range(1, epochs + 1):
         sums, counts = np.zeros(codebook.shape), np.zeros(len(codebook))
-        changed, first = 0, 0
-        for units, part in each(partial(_share, Units.of(codebook))):
-            hit = np.bincount(units, minlength=len(codebook))
-            sums[hit > 0] += part
+        changed, first, distance = 0, 0, 0.0
+        for share in each(partial(_share, Units.of(codebook), progress is not None)):
+            hit = np.bincount(share.units, minlength=len(codebook))
+            sums[hit > 0] += share.sums
             counts += hit
-            known = before[first : first + len(units)]
-            changed += int(np.count_nonzero(units != known))
-            known[:] = units
-            first += len(units)
+            known = before[first : first + len(share.units)]
+            changed += int(np.count_nonzero(share.units != known))
+            known[:] = share.units
+            first += len(share.units)
+            distance += share.distance
         check_again(first, n)
         if epoch > cooling and changed < _SETTLED * n:
             return codebook, epoch - 1
+        if progress is not None:
+            progress(epoch, epochs, distance / n)
         codebook = _smoothed(sums, counts, codebook, float(widths[min(epoch, cooling) - 1]))
     return codebook, epochs
 
 
 def _online(
-    source: Source, n: int, codebook: Singles, rng: np.random.Generator, width: float, epochs: int
+    source: Source,
+    n: int,
+    codebook: Singles,
+    rng: np.random.Generator,
+    width: float,
+    epochs: int,
+    progress: EpochProgress | None,
 ) -> tuple[Singles, int]:
-    """Kohonen's rule: the codebook after all steps, and the number of epochs."""
+    """Kohonen's rule; the quantisation error that `progress` is told is that of the frames as they were met."""
     rows = np.concatenate(list(chunks(source)))
     check_again(len(rows), n)
     side = round(len(codebook) ** 0.5)
@@ -139,18 +168,22 @@ def _online(
     pull = np.empty_like(weights)
     steps = epochs * n
     for epoch in range(epochs):
+        distance = 0.0
         for step, row in enumerate(rng.permutation(n).tolist(), start=epoch * n):
             done = step / max(steps - 1, 1)
             np.subtract(rows[row], weights, out=pull)
             # Not a matrix product: the order in which a BLAS adds depends on its threads.
             squares = np.einsum("uk,uk->u", pull, pull)
             best = int(squares.argmin())
+            distance += float(squares[best]) ** 0.5
             rate = _RATES[0] + (_RATES[1] - _RATES[0]) * done
             spread = -0.5 / (first * (last / first) ** done) ** 2
             down = np.exp(spread * (place - best // side) ** 2)
             right = np.exp(spread * (place - best % side) ** 2)
             pull *= np.outer(rate * down, right).reshape(-1, 1)
             weights += pull
+        if progress is not None:
+            progress(epoch + 1, epochs, distance / n)
     return weights.astype(np.float32), epochs
 
 

@@ -134,21 +134,26 @@ def test_the_online_rule_is_kohonens() -> None:
 
 
 def test_the_online_map_learns_and_repeats_itself() -> None:
-    codes = sample()
-    som = train(codes, rule="online", epochs=5)
+    codes, seen = sample(), []
+    som = train(codes, rule="online", epochs=5, progress=lambda *told: seen.append(told))
     assert som.codebook.tobytes() == train(codes, rule="online", epochs=5).codebook.tobytes()
     assert (som.codebook != train(codes, seed=1, rule="online", epochs=5).codebook).any()
+    assert [told[:2] for told in seen] == [(epoch, 5) for epoch in range(1, 6)]
+    assert seen[-1][2] < 0.5 * seen[0][2]
     assert (
         quality_of(codes, som.codebook).quantisation_error
         < 1.3 * quality_of(codes, train(codes).codebook).quantisation_error
     )
 
 
-def test_the_quantisation_error_falls() -> None:
-    codes = sample()
-    som, first = (train_som(codes, 6, rng=np.random.default_rng(0), epochs=epochs) for epochs in (None, 1))
+def test_the_quantisation_error_falls_and_is_reported() -> None:
+    codes, seen = sample(), []
+    som = train_som(codes, 6, rng=np.random.default_rng(0), progress=lambda *told: seen.append(told))
+    assert [epoch for epoch, _, _ in seen] == list(range(1, som.epochs + 1))
+    assert {epochs for _, epochs, _ in seen} == {50}
+    errors = [error for _, _, error in seen]
     final = quality_of(codes, som.codebook).quantisation_error
-    assert final < 0.75 * quality_of(codes, first.codebook).quantisation_error
+    assert final < 0.5 * errors[0]
     assert final == pytest.approx(brute_force(codes, som.codebook).min(axis=1).mean())
 
 
