@@ -64,9 +64,7 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTi
         model.log10_p[n - 1][row[-1][kept]] = block.log10_p[kept]
     reader.warn_of_unknown()
     model.refresh_all()
-    numbers = np.full(len(vocabulary), -1, np.int64)
-    numbers[sorted_number[sorted_number >= 0]] = np.flatnonzero(sorted_number >= 0)
-    return model, ContextTimes(trie, created, numbers, expected)
+    return model, ContextTimes(trie, created, reader.words.numbers(vocabulary), expected)
 
 
 def tables_of(model: MutableModel, words: WordList) -> ScoreTables:

@@ -1,7 +1,6 @@
 """What `ngram` puts around a model, or several: mixtures, a cache, and exceptions for unknown words and zeros."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,41 +8,32 @@ from placerec.arrays import Ints, Singles
 from placerec.lm.logs import p_of
 from placerec.lm.mix import Cache, loglinear, mixed, posteriors, with_cache
 from placerec.lm.score import TokenSequence
-from placerec.srilm.model.scorers import Model, ModelView, Scored, Scorer, View, event_numbers
+from placerec.srilm.model.scorers import Model, Scored, Scorer, event_numbers
 from placerec.srilm.text.vocabulary import WordList
 
 
-@dataclass(frozen=True)
 class Mixture:
     """The mean of several models (-bayes), weighted by how well they predicted the last `length` words.
 
     `detailed`: print the probabilities of the components.
     """
 
-    models: Sequence[Model]
-    weights: Sequence[float]
-    length: int = 0
-    scale: float = 1.0
-    detailed: bool = False
-
-    def view(self, sequence: TokenSequence) -> "MixtureView":
-        """Read a token sequence."""
-        return MixtureView(self, [model.view(sequence) for model in self.models])
-
-
-class MixtureView:
-    """A token sequence, read by the models of a Mixture."""
-
-    def __init__(self, mixture: Mixture, views: Sequence[ModelView]) -> None:
-        self.mixture = mixture
-        self.views = views
-        T = len(views[0].digits)
-        if mixture.length > 0:
-            joints = np.stack([view.joint(mixture.length) for view in views])
-            self.posteriors = posteriors(mixture.weights, joints, mixture.scale)
+    def __init__(
+        self,
+        models: Sequence[Model],
+        weights: Sequence[float],
+        length: int,
+        scale: float,
+        detailed: bool,
+        sequence: TokenSequence,
+    ) -> None:
+        self.views = [model(sequence) for model in models]
+        self.length, self.detailed = length, detailed
+        if length > 0:
+            self.posteriors = posteriors(weights, np.stack([view.joint(length) for view in self.views]), scale)
         else:
-            plain = np.array(mixture.weights, np.float64)
-            self.posteriors = np.repeat(plain[:, None] / plain.sum(), T, axis=1)
+            plain = np.array(weights, np.float64)
+            self.posteriors = np.repeat(plain[:, None] / plain.sum(), len(sequence.ids), axis=1)
 
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""
@@ -52,9 +42,9 @@ class MixtureView:
 
         def tag(t: int) -> str:
             found = "".join(part.tag(t) for part in parts)
-            if self.mixture.length > 0:
+            if self.length > 0:
                 found += "[post=" + ",".join(f"{weight:.7g}" for weight in self.posteriors[:, t]) + "]"
-            if self.mixture.detailed:
+            if self.detailed:
                 found += "[probs=" + ",".join(f"{p:.7g}" for p in p_of(log10_probs[:, t])) + "]"
             return found
 
@@ -65,34 +55,22 @@ class MixtureView:
         return mixed(np.stack([view.distribution(t) for view in self.views]), self.posteriors[:, t])
 
 
-@dataclass(frozen=True)
 class LogLinear:
-    """The normalised product of powers of several models (-loglinear-mix)."""
+    """The normalised product of powers of several models (-loglinear-mix); normalisers are kept per context."""
 
-    models: Sequence[Model]
-    weights: Sequence[float]
-    words: WordList
-
-    def view(self, sequence: TokenSequence) -> "LogLinearView":
-        """Read a token sequence."""
-        return LogLinearView(self, sequence, [model.view(sequence) for model in self.models])
-
-
-class LogLinearView:
-    """A token sequence, read by the models of a LogLinear; normalisers are kept per context."""
-
-    def __init__(self, mixture: LogLinear, sequence: TokenSequence, views: Sequence[ModelView]) -> None:
-        self.mixture = mixture
-        self.sequence = sequence
-        self.views = views
-        self.events = event_numbers(mixture.words)
-        self.used = np.max([view.contexts.lengths for view in views], axis=0)
+    def __init__(
+        self, models: Sequence[Model], weights: Sequence[float], words: WordList, sequence: TokenSequence
+    ) -> None:
+        self.weights, self.sequence = weights, sequence
+        self.views = [model(sequence) for model in models]
+        self.events = event_numbers(words)
+        self.used = np.max([view.contexts.lengths for view in self.views], axis=0)
         self.sums: dict[tuple[int, ...], float] = {}
 
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""
         parts = [view.score(words) for view in self.views]
-        log10_p = loglinear(np.stack([part.log10_p for part in parts]), self.mixture.weights)
+        log10_p = loglinear(np.stack([part.log10_p for part in parts]), self.weights)
         tags: dict[int, str] = {}
         for t in np.flatnonzero(self.sequence.scored).tolist():
             known = self.context(t) in self.sums
@@ -126,83 +104,52 @@ class LogLinearView:
             return self._products(t) - np.float32(np.log10(self.total(t)))
 
     def _products(self, t: int) -> Singles:
-        return loglinear(np.stack([view.distribution(t) for view in self.views]), self.mixture.weights)
+        return loglinear(np.stack([view.distribution(t) for view in self.views]), self.weights)
 
 
-@dataclass(frozen=True)
 class Cached:
     """A scorer mixed with the shares of words among the last `size` that were predicted (-cache)."""
 
-    base: Scorer
-    words: WordList
-    size: int
-    weight: float
-
-    def view(self, sequence: TokenSequence) -> "CachedView":
-        """Read a token sequence."""
-        return CachedView(self, sequence)
-
-
-class CachedView:
-    """A token sequence, read by what is below the cache; the cache holds what stands before each word."""
-
-    def __init__(self, cached: Cached, sequence: TokenSequence) -> None:
-        self.cached = cached
-        self.ids = sequence.ids
-        self.base = cached.base.view(sequence)
-        counted = sequence.scored & (sequence.ids != cached.words.index[cached.words.unknown])
-        self.cache = Cache(sequence.ids, counted, cached.size)
+    def __init__(self, base: Scorer, words: WordList, size: int, weight: float, sequence: TokenSequence) -> None:
+        self.base, self.weight, self.ids = base(sequence), weight, sequence.ids
+        self.unknown = words.index[words.unknown]
+        self.cache = Cache(sequence.ids, sequence.scored & (sequence.ids != self.unknown), size)
 
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""
         below = self.base.score(words)
-        unknown = self.cached.words.index[self.cached.words.unknown]
         ids = self.ids if words is None else words
         shares = self.cache.shares(ids)
-        log10_p = with_cache(below.log10_p, shares, self.cached.weight)
-        return Scored(log10_p, lambda t: below.tag(t) + (f"[cache={shares[t]:.7g}]" if ids[t] != unknown else ""))
+        log10_p = with_cache(below.log10_p, shares, self.weight)
+        return Scored(log10_p, lambda t: below.tag(t) + (f"[cache={shares[t]:.7g}]" if ids[t] != self.unknown else ""))
 
     def distribution(self, t: int) -> Singles:
         """log10 p of every word."""
         below = self.base.distribution(t)
-        return with_cache(below, self.cache.distribution(t, len(below)), self.cached.weight)
+        return with_cache(below, self.cache.distribution(t, len(below)), self.weight)
 
 
-@dataclass(frozen=True)
 class Lenient:
     """A scorer with exceptions: for the unknown word (-unk-prob), and for probabilities of 0 (-zeroprob-word).
 
     `unknown_p`: log10 p of the unknown word. `stand_in`: the word whose probability replaces one of 0.
     """
 
-    base: Scorer
-    words: WordList
-    unknown_p: float | None = None
-    stand_in: int | None = None
-
-    def view(self, sequence: TokenSequence) -> "LenientView":
-        """Read a token sequence."""
-        return LenientView(self, sequence.ids, self.base.view(sequence))
-
-
-@dataclass(frozen=True)
-class LenientView:
-    """A token sequence, read by the scorer below."""
-
-    lenient: Lenient
-    ids: Ints
-    base: View
+    def __init__(
+        self, base: Scorer, unknown: int, unknown_p: float | None, stand_in: int | None, sequence: TokenSequence
+    ) -> None:
+        self.base, self.ids = base(sequence), sequence.ids
+        self.unknown, self.unknown_p, self.stand_in = unknown, unknown_p, stand_in
 
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""
         below = self.base.score(words)
         ids = self.ids if words is None else words
         log10_p = self._with_unknown(below.log10_p, ids)
-        stand_in = self.lenient.stand_in
-        if stand_in is None:
+        if self.stand_in is None:
             return Scored(log10_p, below.tag)
-        instead = np.isneginf(log10_p) & (ids != stand_in)
-        other = self.base.score(np.full(len(ids), stand_in, np.int64))
+        instead = np.isneginf(log10_p) & (ids != self.stand_in)
+        other = self.base.score(np.full(len(ids), self.stand_in, np.int64))
         return Scored(
             np.where(instead, other.log10_p, log10_p),
             lambda t: below.tag(t) + (other.tag(t) if instead[t] else ""),
@@ -212,11 +159,9 @@ class LenientView:
         """log10 p of every word."""
         below = self.base.distribution(t)
         log10_p = self._with_unknown(below, np.arange(len(below)))
-        stand_in = self.lenient.stand_in
-        return log10_p if stand_in is None else np.where(np.isneginf(log10_p), below[stand_in], log10_p)
+        return log10_p if self.stand_in is None else np.where(np.isneginf(log10_p), below[self.stand_in], log10_p)
 
     def _with_unknown(self, log10_p: Singles, ids: Ints) -> Singles:
-        if self.lenient.unknown_p is None:
+        if self.unknown_p is None:
             return log10_p
-        unknown = ids == self.lenient.words.index[self.lenient.words.unknown]
-        return np.where(unknown, np.float32(self.lenient.unknown_p), log10_p)
+        return np.where(ids == self.unknown, np.float32(self.unknown_p), log10_p)

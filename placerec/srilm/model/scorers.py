@@ -35,11 +35,8 @@ class View(Protocol):
         """log10 p float32 of every word, by SRILM's number, in the place of word `t`."""
 
 
-class Scorer(Protocol):
-    """Something that gives words a probability."""
-
-    def view(self, sequence: TokenSequence) -> View:
-        """Read a token sequence."""
+# Something that gives words a probability: reads a token sequence.
+Scorer = Callable[[TokenSequence], View]
 
 
 def event_mask(words: WordList) -> Mask:
@@ -54,29 +51,19 @@ def event_numbers(words: WordList) -> Ints:
     return np.array([number for number in words.index.values() if events[number]], np.int64)
 
 
-class Null(NamedTuple):
+class Null:
     """Probability 1 for every word (-null)."""
 
-    words: WordList
-
-    def view(self, sequence: TokenSequence) -> "NullView":
-        """Read a token sequence."""
-        return NullView(len(sequence.ids), len(self.words.words))
-
-
-class NullView(NamedTuple):
-    """A token sequence of T words, of a vocabulary of V."""
-
-    T: int
-    V: int
+    def __init__(self, words: WordList, sequence: TokenSequence) -> None:
+        self.words, self.sequence = words, sequence
 
     def score(self, words: Ints | None = None) -> Scored:
         """Always log 1."""
-        return Scored(np.zeros(self.T, np.float32), lambda t: "")
+        return Scored(np.zeros(len(self.sequence.ids), np.float32), lambda t: "")
 
     def distribution(self, t: int) -> Singles:
         """Always log 1."""
-        return np.zeros(self.V, np.float32)
+        return np.zeros(len(self.words.words), np.float32)
 
 
 class Model:
@@ -92,8 +79,7 @@ class Model:
     def tables(self) -> ScoreTables:
         return self._make_tables()
 
-    def view(self, sequence: TokenSequence) -> "ModelView":
-        """Read a token sequence."""
+    def __call__(self, sequence: TokenSequence) -> "ModelView":
         return ModelView(self, sequence)
 
 

@@ -10,14 +10,12 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.counts import NgramCounts, occurrences
 from placerec.lm.stored_text import StoredText
-from placerec.lm.trie import Trie, build_trie, runs
-from placerec.lm.vocabulary import Vocabulary
+from placerec.lm.trie import Trie, runs
 from placerec.srilm.order.hashing import walk_order
-from placerec.srilm.order.messages import Messages
+from placerec.srilm.order.messages import NEVER, ContextTimes, Messages, context_ranks
 from placerec.srilm.text.counts_file import Table
 from placerec.srilm.text.vocabulary import WordList
 
-_NEVER = np.iinfo(np.int64).max
 _LONG = 1 << 40
 _NO_ROWS = np.zeros(0, np.int64)
 
@@ -33,8 +31,7 @@ class FirstSeen:
     def positions(self, trie: Trie) -> list[Ints]:
         """Per order, when each row was first seen, int64 (m_n,)."""
         _, sorted_number = self.words.sorted()
-        never = np.iinfo(np.int64).max
-        first = [np.full(len(keys), never) for keys in trie.keys]
+        first = [np.full(len(keys), NEVER) for keys in trie.keys]
         now = 0
         for table in self.tables:
             for ngram in table.ngrams:
@@ -45,20 +42,13 @@ class FirstSeen:
                 now += 1
         if self.text is not None:
             for n, its in enumerate(first_positions(self.text, trie, sorted_number)):
-                first[n] = np.minimum(first[n], np.where(its < never - now, its + now, never))
+                first[n] = np.minimum(first[n], its + now)
         return first
-
-    def numbers(self, vocabulary: Vocabulary) -> Ints:
-        """SRILM's number of each word of the sorted vocabulary, int64 (V,)."""
-        _, sorted_number = self.words.sorted()
-        numbers = np.full(len(vocabulary), -1, np.int64)
-        numbers[sorted_number[sorted_number >= 0]] = np.flatnonzero(sorted_number >= 0)
-        return numbers
 
     def walk(self, counts: NgramCounts) -> tuple[Ints, Ints]:
         """The n-grams in SRILM's unsorted order: orders and rows, int64 (M,)."""
         trie = counts.trie
-        return walk_order(trie, counts.seen, self.positions(trie), self.numbers(trie.vocabulary))
+        return walk_order(trie, counts.seen, self.positions(trie), self.words.numbers(trie.vocabulary))
 
     def format(self, counts: NgramCounts, *, only: int | None = None, count: str = "%d") -> str:
         """A counts file in SRILM's unsorted order."""
@@ -123,28 +113,13 @@ class EstimationMessages(Messages):
         """Places of contexts in the model, whose tables are nested from the most recent word to the oldest."""
         if n == 1:
             return contexts
-        born = self._born(n)
-        known = [np.flatnonzero(stamp < _NEVER) for stamp in born]
-        backwards = [self.trie.matrix(k)[rows][:, ::-1] for k, rows in enumerate(known, start=1)]
-        vocabulary = self.trie.vocabulary
-        reverse, rows_of = build_trie(vocabulary, n - 1, backwards)
-        first = [np.full(len(keys), _NEVER) for keys in reverse.keys]
-        seen = [np.zeros(len(keys), bool) for keys in reverse.keys]
-        for k, rows in enumerate(known):
-            first[k][rows_of[k][-1]] = born[k][rows]
-            seen[k][rows_of[k][-1]] = True
-        names = len(self.first.words.index)
-        orders, walked = walk_order(reverse, seen, first, self.first.numbers(vocabulary), root_size=names)
-        its = walked[orders == n - 1]
-        place = np.zeros(len(reverse.keys[n - 2]), np.int64)
-        place[its] = np.arange(len(its))
-        of_row = np.zeros(len(self.trie.keys[n - 2]), np.int64)
-        of_row[known[n - 2]] = place[rows_of[n - 2][-1]]
-        return of_row[contexts]
+        words = self.first.words
+        times = ContextTimes(self.trie, self._born(n), words.numbers(self.trie.vocabulary), len(words.index))
+        return context_ranks(times)[n - 2][contexts]
 
     def _born(self, n: int) -> list[Ints]:
         """Per order below n, when each row became a context of the model, int64 (m_k,)."""
-        born = [np.full(len(keys), _NEVER) for keys in self.trie.keys[: n - 1]]
+        born = [np.full(len(keys), NEVER) for keys in self.trie.keys[: n - 1]]
         for k in range(2, n + 1):
             rows = np.concatenate([runs(self.trie.prefix(k)[its])[0] for its in self._stored.get(k, [_NO_ROWS])])
             stamp = k * _LONG + self._walk[k - 2][rows]

@@ -85,26 +85,29 @@ def _fill(table: Ints, keys: NDArray[np.uint64], capacity: int) -> Ints:
     return holder[holder < free]
 
 
-def walk_order(
-    trie: Trie, seen: Sequence[Mask], first: Sequence[Ints], numbers: Ints, *, root_size: int = 0
-) -> tuple[Ints, Ints]:
+def walk_order(trie: Trie, seen: Sequence[Mask], first: Sequence[Ints], numbers: Ints) -> tuple[Ints, Ints]:
     """The n-grams of a count trie as SRILM walks it, each before its extensions: orders and rows, int64 (M,).
 
     `seen`, bool (m_n,) per order: which rows are there (their prefixes must be). `first`, int64 (m_n,) per order: when
     a row was put in, comparable among the rows of one prefix. `numbers` int64 (V,): SRILM's number of each word.
-    `root_size`: the number of entries that the table of single words was created for (0: created empty).
     """
     rows = [np.flatnonzero(there) for there in seen]
-    parents = [trie.prefix(n)[rows[n - 1]] if n > 1 else np.zeros(len(rows[0]), np.int64) for n in _orders(seen)]
-    below = _subtrees(rows, parents, [len(there) for there in seen])
+    parents = [
+        trie.prefix(n)[rows[n - 1]] if n > 1 else np.zeros(len(rows[0]), np.int64) for n in range(1, len(seen) + 1)
+    ]
+    # How many n-grams start with each row, itself included.
+    below = [np.ones(len(there), np.int64) for there in seen]
+    for n in range(len(seen), 1, -1):
+        counted = np.bincount(parents[n - 1], weights=below[n - 1][rows[n - 1]], minlength=len(below[n - 2]))
+        below[n - 2] += counted.astype(np.int64)
     orders, walked = np.empty(sum(map(len, rows)), np.int64), np.empty(sum(map(len, rows)), np.int64)
     behind = np.zeros(1, np.int64)
-    for n in _orders(seen):
+    for n in range(1, len(seen) + 1):
         by_first = np.lexsort((first[n - 1][rows[n - 1]], parents[n - 1]))
         parent = parents[n - 1][by_first]
         starts = np.diff(parent, prepend=-1) > 0
         keys = numbers[trie.word(n)[rows[n - 1]]].astype(np.uint64)
-        ordered = by_first[table_order(np.cumsum(starts) - 1, keys[by_first], size_hint=root_size if n == 1 else 0)]
+        ordered = by_first[table_order(np.cumsum(starts) - 1, keys[by_first])]
         row = rows[n - 1][ordered]
         size = below[n - 1][row]
         before = np.cumsum(size) - size
@@ -114,16 +117,3 @@ def walk_order(
         behind = np.empty(len(seen[n - 1]), np.int64)
         behind[row] = place + 1
     return orders, walked
-
-
-def _orders(seen: Sequence[Mask]) -> range:
-    return range(1, len(seen) + 1)
-
-
-def _subtrees(rows: Sequence[Ints], parents: Sequence[Ints], sizes: Sequence[int]) -> list[Ints]:
-    """Per order, how many n-grams start with each row, itself included: int64 (m_n,)."""
-    below = [np.ones(size, np.int64) for size in sizes]
-    for n in range(len(rows), 1, -1):
-        counted = np.bincount(parents[n - 1], weights=below[n - 1][rows[n - 1]], minlength=sizes[n - 2])
-        below[n - 2] += counted.astype(np.int64)
-    return below

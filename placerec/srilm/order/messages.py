@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LN10
@@ -54,20 +56,24 @@ class Messages(Trace):
             row = int(self.trie.prefix(k)[row]) if k > 1 else row
         return " ".join(found)
 
+    def _last_words(self, n: int, rows: Ints) -> NDArray[np.object_]:
+        return np.array(self.trie.vocabulary.words, object)[self.trie.word(n)[rows]]
+
     def estimated(self, n: int, contexts: Ints) -> Ints:
         """The places int64 (c,) of the contexts of n-grams of order n in the order in which estimation visits them."""
         return self.visited(n - 1, contexts) if n > 1 else contexts
 
     def _say_of(
-        self,
-        n: int,
-        contexts: Ints,
-        lines: list[str],
-        order: ContextOrder,
-        attempt: int = 0,
-        rows: Ints | None = None,
+        self, n: int, contexts: Ints, text: str, order: ContextOrder, *columns: Any, attempt: int = 0, rows: Any = None
     ) -> None:
-        """Keep lines about contexts (and their n-grams `rows`) until it is known in which order they come."""
+        """Keep a line about each context (and its n-gram of `rows`) until it is known in which order they come.
+
+        `text` is filled with the context's words and with the values of the columns (c,), such as numbers or `rows`.
+        """
+        values = zip(*(column.tolist() for column in columns), strict=True) if columns else [()] * len(contexts)
+        lines = [
+            text.format(self.shown(n - 1, row), *more) for row, more in zip(contexts.tolist(), values, strict=True)
+        ]
         if lines:
             self._waiting.append((n, contexts, lines, order, attempt, rows))
 
@@ -123,57 +129,33 @@ class Messages(Trace):
         if self.debug < 4:
             return
         contexts = self.trie.prefix(n)[rows] if n > 1 else np.zeros(len(rows), np.int64)
-        words = self.trie.vocabulary.words
-        lines = []
-        for i, row in enumerate(rows.tolist()):
-            shown = self.shown(n - 1, int(contexts[i])) if n > 1 else ""
-            low = f" LOW {lower[0][i]:g} LOLPROB {lower[1][i]:g}" if lower is not None else ""
-            lines.append(
-                f"CONTEXT {shown} WORD {words[int(self.trie.word(n)[row])]} NUMER {count[i]:g} DENOM {total[i]:g}"
-                f" DISCOUNT {factor[i]:g}{low} LPROB {log10_p[i]:g}"
-            )
-        self._say_of(n, contexts, lines, self.estimated, 2 * attempt, rows)
+        text = "CONTEXT {} WORD {} NUMER {:g} DENOM {:g} DISCOUNT {:g} "
+        text += "LPROB {:g}" if lower is None else "LOW {:g} LOLPROB {:g} LPROB {:g}"
+        columns = self._last_words(n, rows), count, total, factor, *(lower or ()), log10_p
+        self._say_of(n, contexts, text, self.estimated, *columns, attempt=2 * attempt, rows=rows)
 
     def no_mass(self, n: int, attempt: int, contexts: Ints, mass: Floats, *, interpolated: bool) -> None:
         if self.debug < 1:
             return
         remedy = "disabling interpolation" if interpolated else "incrementing denominator"
-        lines = [
-            f"warning: {left:g} backoff probability mass left for"
-            f' "{self.shown(n - 1, row) if n > 1 else ""}" -- {remedy}'
-            for row, left in zip(contexts.tolist(), mass.tolist(), strict=True)
-        ]
-        self._say_of(n, contexts, lines, self.estimated, 2 * attempt + 1)
+        text = f'warning: {{1:g}} backoff probability mass left for "{{0}}" -- {remedy}'
+        self._say_of(n, contexts, text, self.estimated, mass, attempt=2 * attempt + 1)
 
     def full_contexts(self, n: int, contexts: Ints) -> None:
-        lines = [
-            f'BOW denominator for context "{self.shown(n - 1, row)}" is zero; scaling probabilities to sum to 1'
-            for row in contexts.tolist()
-        ]
-        self._say_of(n, contexts, lines, self.weighed)
+        text = 'BOW denominator for context "{}" is zero; scaling probabilities to sum to 1'
+        self._say_of(n, contexts, text, self.weighed)
 
     def overfull_contexts(self, n: int, contexts: Ints, mass: Floats) -> None:
-        lines = [
-            f'BOW numerator for context "{self.shown(n - 1, row) if n > 1 else ""}" is {left:g} < 0'
-            for row, left in zip(contexts.tolist(), mass.tolist(), strict=True)
-        ]
-        self._say_of(n, contexts, lines, self.weighed)
+        self._say_of(n, contexts, 'BOW numerator for context "{}" is {:g} < 0', self.weighed, mass)
 
     def scarce_contexts(self, n: int, contexts: Ints, mass: Floats, minimum: float) -> None:
-        lines = [
-            f'insufficient backoff mass {left:g} for context "{self.shown(n - 1, row) if n > 1 else ""}";'
-            f" scaling probabilities to mass {1 - minimum:g}"
-            for row, left in zip(contexts.tolist(), mass.tolist(), strict=True)
-        ]
-        self._say_of(n, contexts, lines, self.weighed)
+        text = f'insufficient backoff mass {{1:g}} for context "{{0}}"; scaling probabilities to mass {1 - minimum:g}'
+        self._say_of(n, contexts, text, self.weighed, mass)
 
     def weights(self, n: int, contexts: Ints, num: Floats, den: Floats, weight: Singles) -> None:
         if self.debug >= 4:
-            lines = [
-                f"CONTEXT {self.shown(n - 1, row) if n > 1 else ''} numerator {a:g} denominator {b:g} BOW {bow:g}"
-                for row, a, b, bow in zip(contexts.tolist(), num.tolist(), den.tolist(), weight.tolist(), strict=True)
-            ]
-            self._say_of(n, contexts, lines, self.weighed, 1)
+            text = "CONTEXT {} numerator {:g} denominator {:g} BOW {:g}"
+            self._say_of(n, contexts, text, self.weighed, num, den, weight, attempt=1)
         self._flush()
 
     def unigram_mass(self, mass: float, words: int, *, everyone: bool) -> None:
@@ -194,15 +176,10 @@ class Messages(Trace):
     ) -> None:
         if self.debug < 4:
             return
-        contexts, words = self.trie.prefix(n)[rows], self.trie.vocabulary.words
-        change, perplexity = new - old, np.exp(entropy * LN10) - 1
-        lines = [
-            f"CONTEXT {self.shown(n - 1, int(contexts[i]))} WORD {words[int(self.trie.word(n)[row])]}"
-            f" CONTEXTPROB {context[i]:g} OLDPROB {old[i]:g} NEWPROB {new[i]:g} DELTA-H {entropy[i]:g}"
-            f" DELTA-LOGP {change[i]:g} PPL-CHANGE {perplexity[i]:g} PRUNED {int(gone[i])}"
-            for i, row in enumerate(rows.tolist())
-        ]
-        self._say_of(n, contexts, lines, self.weighed, 1)
+        text = "CONTEXT {} WORD {} CONTEXTPROB {:g} OLDPROB {:g} NEWPROB {:g} DELTA-H {:g} DELTA-LOGP {:g}"
+        text += " PPL-CHANGE {:g} PRUNED {:d}"
+        columns = self._last_words(n, rows), context, old, new, entropy, new - old, np.exp(entropy * LN10) - 1, gone
+        self._say_of(n, self.trie.prefix(n)[rows], text, self.weighed, *columns, attempt=1)
 
     def pruned(self, n: int, rows: Ints) -> None:
         self._flush()
@@ -234,7 +211,7 @@ def message_order(trie: Trie, times: ContextTimes) -> ContextOrder:
         if n == 1:
             return contexts
         if not ranks:
-            ranks.extend(_iteration(times))
+            ranks.extend(context_ranks(times))
         row = _same_rows(trie, times.trie, n - 1, contexts)
         known = ranks[n - 2][row] if n - 1 <= len(ranks) and len(ranks[n - 2]) else np.full(len(row), NEVER)
         known = np.where(row >= 0, known, NEVER)
@@ -260,16 +237,16 @@ def _same_rows(trie: Trie, other: Trie, n: int, rows: Ints) -> Ints:
     return found
 
 
-def _iteration(times: ContextTimes) -> list[Ints]:
+def context_ranks(times: ContextTimes) -> list[Ints]:
     """Per length of context, the place of each row in SRILM's walk, int64 (m_n,); NEVER for what is no context."""
     trie = times.trie
     ranks: list[Ints] = []
     oldest, above = trie.keys[0], np.zeros(len(trie.vocabulary), np.int64)
-    for k in range(1, trie.order):
+    for k, created in enumerate(times.created[: trie.order - 1], start=1):
         if k > 1:
             oldest, above = oldest[trie.prefix(k)], ranks[-1][trie.suffixes[k - 1]]
-        rows = np.flatnonzero(times.created[k - 1] < NEVER)
-        rows = rows[np.lexsort((times.created[k - 1][rows], above[rows]))]
+        rows = np.flatnonzero(created < NEVER)
+        rows = rows[np.lexsort((created[rows], above[rows]))]
         table: Ints = np.cumsum(np.diff(above[rows], prepend=above[rows][:1]) > 0)
         keys = times.numbers[oldest[rows]].astype(np.uint64)
         walked = rows[table_order(table, keys, size_hint=times.expected if k == 1 else 0)]

@@ -85,6 +85,13 @@ class WordList:
         count = Counter(self.index.values())
         return [count[self.index[word]] for word in vocabulary.words]
 
+    def numbers(self, vocabulary: "Vocabulary") -> "Ints":
+        """SRILM's number of each word of the sorted vocabulary, int64 (V,)."""
+        import numpy as np
+
+        numbered = {word: number for number, word in enumerate(self.words)}
+        return np.array([numbered[word] for word in vocabulary.words], np.int64)
+
     def sorted(self) -> "tuple[Vocabulary, Ints]":
         """The words in code-point order, and by number here each word's number there, int64 (N,), -1 if lost."""
         from placerec.lm.vocabulary import Vocabulary

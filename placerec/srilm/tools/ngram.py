@@ -249,7 +249,7 @@ class _Run:
         def spread(history: Sequence[int]) -> Singles:
             ids = np.array([*history, end], np.int64)
             place = np.arange(len(ids))
-            view = scorer.view(TokenSequence(ids, place == 0, place == len(history)))
+            view = scorer(TokenSequence(ids, place == 0, place == len(history)))
             return np.where(events, view.distribution(len(history)), np.float32(-np.inf))
 
         prefixes = map(tokens, self.streams.lines(options["gen-prefixes"])) if options["gen-prefixes"] else [[]]

@@ -34,7 +34,7 @@ class Models:
     def scorer(self) -> Scorer:
         """What scores: sections 9.2 to 9.6, in this order."""
         if self.options["null"]:
-            scorer: Scorer = Null(self.words)
+            scorer: Scorer = partial(Null, self.words)
         else:
             self.mutable, self.times = self.read("lm", "lm file")
             scorer = self.with_cache(self.mixed())
@@ -95,8 +95,8 @@ class Models:
         models = [model, *(Model(partial(tables_of, mutable, self.words), self.words) for mutable in mutables)]
         self.mutable = None
         if options["loglinear-mix"]:
-            return LogLinear(models, weights, self.words)
-        return Mixture(models, weights, options["bayes"], options["bayes-scale"], self.debug == 3)
+            return partial(LogLinear, models, weights, self.words)
+        return partial(Mixture, models, weights, options["bayes"], options["bayes-scale"], self.debug == 3)
 
     def model(self) -> MutableModel:
         """The model that was read; there is one wherever this is called."""
@@ -134,7 +134,7 @@ class Models:
         if not self.options["cache"]:
             return scorer
         self.mutable = None
-        return Cached(scorer, self.words, self.options["cache"], self.options["cache-lambda"])
+        return partial(Cached, scorer, self.words, self.options["cache"], self.options["cache-lambda"])
 
     def lenient(self, scorer: Scorer) -> Scorer:
         """`-zeroprob-word` and `-unk-prob`."""
@@ -143,7 +143,8 @@ class Models:
             return scorer
         if unknown_p == LOG_ZERO:
             unknown_p = -np.inf
-        return Lenient(scorer, self.words, unknown_p, None if stand_in is None else self.words.add(stand_in))
+        number = None if stand_in is None else self.words.add(stand_in)
+        return partial(Lenient, scorer, self.words.index[self.words.unknown], unknown_p, number)
 
     def rescored(self, scorer: Scorer) -> Scorer:
         """`-rescore-ngram` (section 11.6): another model's n-grams with the probabilities that `scorer` gives them."""
@@ -155,7 +156,7 @@ class Models:
         for n in range(mutable.order, 0, -1):
             rows = np.flatnonzero(mutable.stored[n - 1])
             sequence = TokenSequence.of_rows(numbers[mutable.trie.matrix(n)[rows]])
-            mutable.log10_p[n - 1][rows] = scorer.view(sequence).score().log10_p[n - 1 :: n]
+            mutable.log10_p[n - 1][rows] = scorer(sequence).score().log10_p[n - 1 :: n]
         reweigh(mutable, self.messages(mutable))
         self.mutable, self.words = mutable, own
         return Model(partial(tables_of, mutable, own), own)

@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import NamedTuple
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -21,18 +20,13 @@ from placerec.srilm.text.vocabulary import WordList
 TOKENS, SUMS, RANKS = 2, 3, 4
 
 
-def block(totals: Totals, ranks: Ranks | None = None) -> str:
-    """The block of statistics (section 10.2): totals and perplexities, and of -debug 4 the `ranks`."""
+def _block(totals: Totals, ranks: Ranks | None) -> str:
     text = f"{totals.sentences:.16g} sentences, {totals.words:.16g} words, {totals.oovs:.16g} OOVs\n"
     if not totals.words + totals.sentences > 0:
         return text
-    ppl, ppl1 = _perplexity(totals.ppl), _perplexity(totals.ppl1)
+    ppl, ppl1 = ("undefined" if value is None else _number(value) for value in (totals.ppl, totals.ppl1))
     text += f"{totals.zeroprobs:.16g} zeroprobs, logprob= {_number(totals.log10_p)} ppl= {ppl} ppl1= {ppl1}\n"
     return text if ranks is None else text + _rank_lines(ranks)
-
-
-def _perplexity(value: float | None) -> str:
-    return "undefined" if value is None else _number(value)
 
 
 def _number(value: float) -> str:
@@ -69,6 +63,10 @@ class Printer:
     def name(self, number: int) -> str:
         """The word that has this number of SRILM's."""
         return str(self.words.words[number])
+
+    def block(self, totals: Totals, ranks: Ranks | None) -> str:
+        """The block of statistics (section 10.2): totals and perplexities, and with -debug 4 the ranks."""
+        return _block(totals, ranks if self.debug >= RANKS else None)
 
     def token(self, word: int, context: str, tag: str, p: float, log10_p: float, weight: float = 1) -> str:
         """The line of a token without its end: p( WORD | CONTEXT) = TAG P [ LOG10P ] (section 10.3)."""
@@ -107,17 +105,16 @@ def _score_sentences(
 ) -> tuple[Floats, list["_Line"]]:
     """The totals of each sentence (S, 5), and what there is to print about its words."""
     sequence, lengths = _sequence(marked), marked.lengths
-    ended = np.zeros(len(lengths), bool)
-    predicted = lengths - marked.opened > 0
-    last = sequence.ids[(np.cumsum(lengths) - 1)[predicted]]
-    ended[predicted] = last == printer.words.index.get(SENTENCE_END, -1)
-    view = scorer.view(sequence)
+    ended = lengths - marked.opened > 0
+    last = sequence.ids[(np.cumsum(lengths) - 1)[ended]]
+    ended[ended] = last == printer.words.index.get(SENTENCE_END, -1)
+    view = scorer(sequence)
     scored = view.score()
     unknown = sequence.ids == printer.words.index[printer.words.unknown]
     totals = tally_sentences(scored.log10_p, unknown, sequence.scored, lengths, ended) * sentences.weights[:, None]
     if printer.debug < TOKENS:
         return totals, [_Line() for _ in ended] if printer.debug else []
-    return totals, _token_lines(printer, view, scored, _Batch(sequence, lengths, ended, sentences.weights))
+    return totals, _token_lines(printer, view, scored, sequence, lengths, ended, sentences.weights)
 
 
 def _sequence(marked: Marked) -> TokenSequence:
@@ -129,31 +126,24 @@ def _sequence(marked: Marked) -> TokenSequence:
     return TokenSequence(marked.numbers, first, scored)
 
 
-class _Batch(NamedTuple):
-    """Sentences: their words, lengths (S,), whether they end in </s> (S,), and weights (S,)."""
-
-    part: TokenSequence
-    lengths: Ints
-    ended: Mask
-    weights: Floats
-
-
+@dataclass
 class _Line:
     """The lines of one sentence's tokens, and their ranks."""
 
-    def __init__(self) -> None:
-        self.text: list[str] = []
-        self.ranks = Ranks()
+    text: list[str] = field(default_factory=list)
+    ranks: Ranks = field(default_factory=Ranks)
 
 
-def _token_lines(printer: Printer, view: View, scored: Scored, batch: _Batch) -> list[_Line]:
-    part = batch.part
-    lines = [_Line() for _ in batch.ended]
+def _token_lines(
+    printer: Printer, view: View, scored: Scored, part: TokenSequence, lengths: Ints, ended: Mask, weights: Floats
+) -> list[_Line]:
+    """The lines of sentences with these lengths (S,) that end in </s> or not (S,), and the ranks times weights (S,)."""
+    lines = [_Line() for _ in ended]
     at = np.flatnonzero(part.scored)
     begin = np.maximum.accumulate(np.where(part.first, np.arange(len(part.ids)), 0))
     # The first word of a sentence is marked by the lack of dots.
     opening = part.first[at] | ((at > 0) & part.first[at - 1] & ~part.scored[at - 1])
-    sentence = np.repeat(np.arange(len(batch.lengths)), batch.lengths)[at]
+    sentence = np.repeat(np.arange(len(lengths)), lengths)[at]
     columns = (at, begin[at], sentence, opening, scored.log10_p[at], p_of(scored.log10_p[at]))
     words = part.ids.tolist()
     # N-grams repeat, and printing numbers takes long.
@@ -168,7 +158,7 @@ def _token_lines(printer: Printer, view: View, scored: Scored, batch: _Batch) ->
         line.text.append(text + printer.sum(view, t, part.ids[start:t]) + "\n")
         if printer.debug >= RANKS:
             last = t + 1 == len(words) or bool(part.first[t + 1])
-            end, weight = bool(last and batch.ended[i]), float(batch.weights[i])
+            end, weight = bool(last and ended[i]), float(weights[i])
             line.ranks = line.ranks.plus(printer.rank(view, t, words[t], log10_p, end=end, weight=weight))
     return lines
 
@@ -178,11 +168,8 @@ class _Summary:
 
     def __init__(self, printer: Printer) -> None:
         self.printer = printer
-        self.total = Totals()
-        self.group = Totals()
-        self.ranks = Ranks()
-        self.started = False
-        self.grouped = False
+        self.total, self.group, self.ranks = Totals(), Totals(), Ranks()
+        self.started = self.grouped = False
 
     def add(self, sentences: Sentences, totals: Floats, lines: Sequence[_Line]) -> None:
         """Sentences with their totals (S, 5), and what there is to print about their tokens."""
@@ -202,22 +189,22 @@ class _Summary:
         self.group = self.group.plus(whole)
         for text, row, line in zip(shown, totals.tolist(), lines, strict=False):
             self.ranks = self.ranks.plus(line.ranks)
-            ranks = line.ranks if self.printer.debug >= RANKS else None
-            self.printer.streams.print(text + "\n" + "".join(line.text) + block(Totals(*row), ranks) + "\n")
+            block = self.printer.block(Totals(*row), line.ranks)
+            self.printer.streams.print(text + "\n" + "".join(line.text) + block + "\n")
 
     def _group(self) -> None:
-        self.printer.streams.print(block(self.group) + "\n")
+        self.printer.streams.print(_block(self.group, None) + "\n")
         self.group, self.grouped = Totals(), True
 
     def finish(self, name: str) -> None:
         """What stands at the end of a file."""
         if self.grouped:
             self._group()
-        ranks = self.ranks if self.printer.debug >= RANKS else None
-        self.printer.streams.print(f"file {name}: " + block(self.total, ranks))
+        self.printer.streams.print(f"file {name}: " + self.printer.block(self.total, self.ranks))
 
 
 _Table = dict[tuple[int, ...], float]
+_Sums = tuple[Totals, Ranks]
 
 
 @dataclass(frozen=True)
@@ -230,24 +217,16 @@ class Counting:
     escape: str | None = None
 
 
-@dataclass
-class _Sums:
-    """Totals and ranks, of all n-grams and of those since the last escaped line."""
-
-    total: Totals = field(default_factory=Totals)
-    ranks: Ranks = field(default_factory=Ranks)
-
-
 def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting) -> None:
     """Score the n-grams of a counts file, each given its own first words, and print what `printer.debug` asks for."""
-    total, grouped = _Sums(), False
+    parts: list[_Sums] = []
     table: _Table = {}
     lines = printer.streams.lines(name)
     for line in lines:
         if counting.escape is not None and line.startswith(counting.escape):
             if table:
-                _add(total, _group(table, scorer, printer, counting, shown=True))
-                table, grouped = {}, True
+                parts.append(_group(table, scorer, printer, counting, shown=True))
+                table = {}
             printer.streams.print(line + "\n")
             continue
         words, count = split_count(line, counting.fractional)
@@ -256,32 +235,31 @@ def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting
         elif len(words) <= counting.order:
             ngram = tuple(map(printer.words.known, words))
             table[ngram] = table.get(ngram, 0) + count
-    _add(total, _group(table, scorer, printer, counting, shown=grouped or printer.debug >= 1))
-    ranks = total.ranks if printer.debug >= RANKS else None
-    printer.streams.print(f"file {name}: {block(_whole(total.total, counting), ranks)}")
+    parts.append(_group(table, scorer, printer, counting, shown=bool(parts) or printer.debug >= 1))
+    printer.streams.print(f"file {name}: {_counts_block(printer, _sum(parts), counting)}")
 
 
-def _add(total: _Sums, part: _Sums) -> None:
-    total.total = total.total.plus(part.total)
-    total.ranks = total.ranks.plus(part.ranks)
+def _sum(parts: Sequence[_Sums]) -> _Sums:
+    return reduce(lambda a, b: (a[0].plus(b[0]), a[1].plus(b[1])), parts, (Totals(), Ranks()))
 
 
-def _whole(totals: Totals, counting: Counting) -> Totals:
-    return totals._replace(sentences=0, words=1) if counting.entropy else totals
+def _counts_block(printer: Printer, sums: _Sums, counting: Counting) -> str:
+    totals, ranks = sums
+    return printer.block(totals._replace(sentences=0, words=1) if counting.entropy else totals, ranks)
 
 
 def _group(table: _Table, scorer: Scorer, printer: Printer, counting: Counting, *, shown: bool) -> _Sums:
     """Score the n-grams between two escaped lines."""
-    sums = _Sums()
+    parts = []
     for n in range(1, counting.order + 1):
         ngrams = [ngram for ngram, count in table.items() if len(ngram) == n and count]
         ngrams.sort(key=lambda ngram: [printer.name(word) for word in ngram])
         if ngrams:
             counts = np.array([table[ngram] for ngram in ngrams], np.float64)
-            _add(sums, _score_ngrams(np.array(ngrams, np.int64), counts, scorer, printer, counting))
+            parts.append(_score_ngrams(np.array(ngrams, np.int64), counts, scorer, printer, counting))
+    sums = _sum(parts)
     if shown:
-        ranks = sums.ranks if printer.debug >= RANKS else None
-        printer.streams.print(block(_whole(sums.total, counting), ranks) + "\n")
+        printer.streams.print(_counts_block(printer, sums, counting) + "\n")
     return sums
 
 
@@ -292,30 +270,25 @@ def _score_ngrams(ngrams: Ints, counts: Floats, scorer: Scorer, printer: Printer
     behind = np.full((m, 1), printer.words.index[printer.words.unknown])
     sequence = TokenSequence.of_rows(np.concatenate([ngrams, behind], axis=1))
     sequence = sequence._replace(scored=sequence.place == n - 1)
-    view = scorer.view(sequence)
+    view = scorer(sequence)
     scored = view.score()
     weights = counts
     if counting.entropy and isinstance(view, ModelView):
         weights = counts * p_of(view.joint(n)[n :: n + 1])
     end, unknown = printer.words.index.get(SENTENCE_END), printer.words.index[printer.words.unknown]
-    sums = _Sums()
+    total, ranks = Totals(), Ranks()
     for i, (ngram, count, weight) in enumerate(zip(ngrams.tolist(), counts.tolist(), weights.tolist(), strict=True)):
         t, word = i * (n + 1) + n - 1, ngram[-1]
         log10_p = float(scored.log10_p[t])
         zero, last = log10_p == -np.inf, word == end
-        totals = Totals(
-            count if last else 0,
-            0 if last else count,
-            count if zero and word == unknown else 0,
-            count if zero and word != unknown else 0,
-            0 if zero else weight * log10_p,
-        )
-        sums.total = sums.total.plus(totals)
+        oov, impossible = zero and word == unknown, zero and word != unknown
+        counted = Totals(last, not last, oov, impossible).times(count)
+        total = total.plus(counted._replace(log10_p=0 if zero else weight * log10_p))
         if printer.debug >= TOKENS:
             context = " ".join(printer.name(number) for number in ngram[-2::-1])
             p = float(p_of(scored.log10_p[t : t + 1])[0])
             text = printer.token(word, context + " ", scored.tag(t), p, log10_p, weight)
             printer.streams.print(text + printer.sum(view, t, np.array(ngram[:-1], np.int64)) + "\n")
         if printer.debug >= RANKS:
-            sums.ranks = sums.ranks.plus(printer.rank(view, t, word, log10_p, end=last, weight=count))
-    return sums
+            ranks = ranks.plus(printer.rank(view, t, word, log10_p, end=last, weight=count))
+    return total, ranks
