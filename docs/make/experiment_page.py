@@ -21,9 +21,9 @@ import numpy as np
 
 from placerec.evaluation.bootstrap import LEAST
 from placerec.experiments.grid.claims import Claim, judge
+from placerec.experiments.grid.report import Table, markdown, numbers_of
 from placerec.experiments.grid.results import Results, Row, SequenceCount, by_seed
 from placerec.experiments.grid.run import experiment
-from placerec.experiments.grid.tables import Table, markdown, numbers_of
 from placerec.files import write_text
 from placerec.lab.layout import render_lab
 

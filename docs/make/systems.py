@@ -19,8 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
-from placerec.experiments.comparison.benchmark import COMPARED, MethodRun
-from placerec.experiments.comparison.encoded import FrontEndCost
+from placerec.experiments.comparison.benchmark import COMPARED, FrontEndCost, MethodRun
 from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.results import Comparison, MethodScore, format_methods, format_pairs, judge
 from placerec.experiments.comparison.run import SIZE, compare

@@ -9,11 +9,9 @@ from typing import Any
 
 import click
 
-from placerec.cli.beliefs import decode, evaluate
 from placerec.cli.experiments import compare, demo, experiment, lab
-from placerec.cli.images import describe, tokenize, train_words
-from placerec.cli.looking import show_frame, show_words, stability
-from placerec.cli.models import calibrate, check, inspect, train_lm, update
+from placerec.cli.images import describe, show_frame, show_words, stability, tokenize, train_words
+from placerec.cli.models import calibrate, check, decode, evaluate, inspect, train_lm, update
 from placerec.cli.srilm import SRILM_COMMANDS
 from placerec.errors import PlacerecError
 from placerec.version import __version__

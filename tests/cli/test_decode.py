@@ -9,7 +9,7 @@ from click.testing import Result
 from helpers.small_world import PLACES, write_tokens
 from helpers.typed_commands import placerec
 
-from placerec.cli.beliefs import METHODS
+from placerec.cli.models import METHODS
 from placerec.model import calibrate, train_lm
 
 

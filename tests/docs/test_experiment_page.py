@@ -13,8 +13,8 @@ import pytest
 from helpers.small_world import write_tokens
 
 from placerec.experiments.grid.config import read_config
+from placerec.experiments.grid.report import PAPER_RUNS
 from placerec.experiments.grid.results import COLUMNS, SEQUENCE_COLUMNS
-from placerec.experiments.grid.tables import PAPER_RUNS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "experiment.md"

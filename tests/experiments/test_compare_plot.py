@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from placerec.experiments.comparison.encoded import FrontEndCost
+from placerec.experiments.comparison.benchmark import FrontEndCost
 from placerec.experiments.comparison.figure import plot_comparison, spread
 from placerec.experiments.comparison.results import Comparison, MethodScore
 

@@ -14,9 +14,9 @@ from placerec.experiments.grid import report
 from placerec.experiments.grid.cells import GridJob
 from placerec.experiments.grid.claims import CLAIMS
 from placerec.experiments.grid.config import Config
+from placerec.experiments.grid.report import markdown, ranked
 from placerec.experiments.grid.results import Results
 from placerec.experiments.grid.run import experiment
-from placerec.experiments.grid.tables import markdown, ranked
 from placerec.figures.evaluation import evaluate_files
 
 IMAGES = """

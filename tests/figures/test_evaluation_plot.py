@@ -13,8 +13,7 @@ from helpers.small_world import beliefs_of
 from placerec.errors import MissingExtraError, OutputError
 from placerec.evaluation.metrics import evaluate
 from placerec.figures.canvas import figure_file, place_colours
-from placerec.figures.evaluation import chosen, plot_evaluation
-from placerec.figures.panels import belief_strip, confusion_panel
+from placerec.figures.evaluation import belief_strip, chosen, confusion_panel, plot_evaluation
 from placerec.hohmm.beliefs import Beliefs
 
 matplotlib = pytest.importorskip("matplotlib")

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from placerec.arrays import Ints
-from placerec.cli.beliefs import METHODS as NAMED
+from placerec.cli.models import METHODS as NAMED
 from placerec.methods import METHODS, MakeStepper, TrainingSet, decode, load_decoder, make_training_set
 from placerec.model import ModelOptions, train_lm
 from placerec.words import Selection, read_stream

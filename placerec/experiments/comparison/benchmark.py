@@ -1,10 +1,10 @@
-"""Every method on the same test frames: fitted, run on-line one frame after the other, and timed.
+"""Every method on the same test frames: encoded, fitted, run on-line one frame after the other, and timed.
 
 A method is added in COMPARED alone: how it is fitted and run, what it is made of, and what it needs.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
@@ -13,9 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from placerec.arrays import Floats
-from placerec.experiments.comparison.encoded import EncodedSequences
-from placerec.experiments.store import key_of
+from placerec.arrays import Floats, Ints, Singles
+from placerec.errors import SourceError
+from placerec.experiments.store import WordsJob, key_of, load, save
+from placerec.frames import Sequence as FrameSequence
+from placerec.frames import images_at
+from placerec.frames.sequence import Gray
 from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder
 from placerec.lm.backoff import unite_models
 from placerec.methods import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
@@ -23,8 +26,13 @@ from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
 from placerec.methods.tables import PairEmissions
 from placerec.model import Decoding, ModelOptions, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
-from placerec.words import Selection, place_steps, sentences_per_place
+from placerec.vision import Descriptors, Dictionary, descriptor
+from placerec.vision.pca import project
+from placerec.words import Selection, WordStream, place_steps, sentences_per_place
+from placerec.words.tokenize import tokens_of
 
+# Images that the cost of the front end is measured on.
+TIMED = 30
 # Each method is run so often over the test frames; the fastest run is told.
 RUNS = 3
 # What a method gets of a frame.
@@ -32,6 +40,75 @@ WORDS, TWO_WORDS, DESCRIPTORS = "words", "words, two dictionaries", "descriptors
 # A frame's word (or two, or components) to its belief float64 (C,); and what begins a sequence.
 StepFunction = Callable[[Any], Floats]
 MakeStepper = Callable[[], StepFunction]
+
+
+@dataclass(frozen=True)
+class FrontEndCost:
+    """Microseconds that a frame takes before any method sees it: for its descriptor, and from that to its word."""
+
+    descriptor: float
+    word: float
+
+
+@dataclass(frozen=True)
+class EncodedSequences:
+    """All sequences through one dictionary, those of the training first.
+
+    `streams`: the words of each sequence; `points` float32 (T, k): the principal components of its T frames.
+    """
+
+    dictionary: Dictionary
+    streams: tuple[WordStream, ...] = field(repr=False)
+    points: tuple[Singles, ...] = field(repr=False)
+    cost: FrontEndCost
+
+    def units(self, sequence: int) -> Ints:
+        """The words of a sequence as numbers of units, int64 (T,)."""
+        number = {word: unit for unit, word in enumerate(self.dictionary.vocabulary)}
+        return np.array([number[word] for word in self.streams[sequence].words], np.int64)
+
+
+def encode(job: WordsJob) -> EncodedSequences:
+    """Learn the words of a job, and give all frames of the job theirs. Raises VisionError or SourceError for images."""
+    dictionary = job.dictionary()
+    found = [one.load() for one in (*job.train, *job.test)]
+    streams = tuple(stream for one in found for stream in tokens_of(one, dictionary))
+    points = tuple(project(one.values, dictionary.pca) for one in found)
+    return EncodedSequences(dictionary, streams, points, _cost(job, found[len(job.train) :], dictionary))
+
+
+def _cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dictionary) -> FrontEndCost:
+    """The mean over some test images, one at a time; reading them is not counted."""
+    sequences = [one.sequence for one in job.test]
+    path = job.cache / "costs" / f"{key_of(dictionary.fingerprint, [s.name for s in sequences])}.json"
+    kept = load(path)
+    if kept:
+        return FrontEndCost(**kept)
+    spent, timed = np.zeros(2), 0
+    for gray in _spread_images(sequences, tests):
+        started = perf_counter()
+        row = descriptor(gray, dictionary.spec)[None]
+        described = perf_counter()
+        dictionary.words(row)
+        spent += described - started, perf_counter() - described
+        timed += 1
+    cost = FrontEndCost(*(1e6 * spent / timed).tolist())
+    save(path, asdict(cost))
+    return cost
+
+
+def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descriptors]) -> Iterator[Gray]:
+    """Some images of those that have a descriptor, from all of the recordings."""
+    usable = []
+    for number, (sequence, one) in enumerate(zip(sequences, found, strict=True)):
+        names = set(one.table.names)
+        usable += [(number, k) for k, frame in enumerate(sequence.frames) if frame.name in names]
+    chosen = [usable[i] for i in np.unique(np.linspace(0, len(usable) - 1, TIMED).astype(int))]
+    for number, sequence in enumerate(sequences):
+        for image in images_at(sequence, [k for own, k in chosen if own == number]):
+            if isinstance(image, str):
+                raise SourceError(image)
+            yield image
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from typing import Any
 
 from placerec.evaluation.bootstrap import Pair, compare_pairs, count_blocks, draw, interval
 from placerec.evaluation.metrics import evaluate
-from placerec.experiments.comparison.benchmark import MethodRun
-from placerec.experiments.comparison.encoded import FrontEndCost
+from placerec.experiments.comparison.benchmark import FrontEndCost, MethodRun
 
 
 @dataclass(frozen=True)

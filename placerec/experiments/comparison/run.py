@@ -15,8 +15,7 @@ from pathlib import Path
 
 from placerec.errors import EvaluationError, SourceError, check_optional
 from placerec.evaluation.bootstrap import LEAST
-from placerec.experiments.comparison.benchmark import COMPARED, TWO_WORDS, Benchmark, MethodRun, train_models
-from placerec.experiments.comparison.encoded import encode
+from placerec.experiments.comparison.benchmark import COMPARED, TWO_WORDS, Benchmark, MethodRun, encode, train_models
 from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load

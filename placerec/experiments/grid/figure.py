@@ -16,7 +16,7 @@ from placerec.evaluation.metrics import Evaluation
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.results import Row, Setting, by_seed
 from placerec.figures.canvas import figure_file, place_colours
-from placerec.figures.panels import belief_strip, confusion_panel, legend_panel
+from placerec.figures.evaluation import belief_strip, confusion_panel, legend_panel
 from placerec.hohmm import Beliefs
 
 if TYPE_CHECKING:

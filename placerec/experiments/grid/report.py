@@ -3,19 +3,21 @@
 import platform
 import shlex
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from os.path import relpath
 from pathlib import Path
 
+import numpy as np
+
 from placerec.errors import ExperimentError
+from placerec.evaluation.bootstrap import DRAWS, LEAST
 from placerec.evaluation.metrics import evaluate
-from placerec.experiments.grid import tables
 from placerec.experiments.grid.cells import GridCell, GridJob, believe_cell
-from placerec.experiments.grid.claims import judge
+from placerec.experiments.grid.claims import HIGH, Claim, Statement, judge
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
-from placerec.experiments.grid.results import Results, Setting
+from placerec.experiments.grid.results import FoldData, Results, Row, Setting, by_seed
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
@@ -25,7 +27,121 @@ from placerec.inspection.words import typical_images, word_table
 from placerec.version import __version__
 from placerec.vision import Descriptors, Dictionary
 
+PAPER_RUNS = {10: "3.15", 20: "2.67"}
+_CAPTION = "Mean over seeds, with one standard deviation. Dotted: always the most frequent place. Dashed: naive Bayes."
 _PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib")
+Table = tuple[Sequence[str], Sequence[Sequence[str]]]
+
+
+def images_table(folds: Mapping[str, FoldData]) -> Table:
+    """Labelled images per place and split (the paper's Table 2)."""
+    places = sorted({place for fold in folds.values() for place in (*fold.train, *fold.test)})
+    lines = []
+    for name, fold in folds.items():
+        for split, images in (("training", fold.train), ("testing", fold.test)):
+            counts = [images.get(place, 0) for place in places]
+            lines.append((name, split, *map(str, counts), str(sum(counts))))
+    return ("fold", "split", *places, "all"), lines
+
+
+def runs_table(rows: Iterable[Row]) -> Table:
+    """Frames in a row with the same word in training, mean over seeds and folds (the paper's Table 1)."""
+    runs: dict[int, dict[tuple[int, str], float]] = {}
+    for row in rows:
+        runs.setdefault(row.size, {})[row.seed, row.fold] = row.same_word_run
+    lines = [
+        (str(size), f"{np.mean([*values.values()]):.2f}", PAPER_RUNS.get(size, ""))
+        for size, values in sorted(runs.items())
+    ]
+    return ("S", "same-word run", "in the paper, on COLD"), lines
+
+
+def best_table(results: Results, most: int = 10) -> Table:
+    """The best settings, with baselines: percent of the frames, mean and standard deviation over seeds."""
+    tables = [
+        by_seed(results.rows, share) for share in (lambda o: o.right, lambda o: o.frame_wise, lambda o: o.majority)
+    ]
+    lines = []
+    for setting in ranked(results)[:most]:
+        right, alone, majority = (100 * np.array(table[setting]) for table in tables)
+        spread = f" ± {right.std(ddof=1):.1f}" if len(right) > 1 else ""
+        names = str(setting.size), setting.smoothing, setting.select, str(setting.order), setting.transition
+        lines.append((*names, f"{right.mean():.1f}{spread}", f"{alone.mean():.1f}", f"{majority.mean():.1f}"))
+    names_ = ("S", "smoothing", "select", "n", "transition")
+    return (*names_, "frames right, %", "each frame alone, %", "most frequent place, %"), lines
+
+
+def ranked(results: Results) -> list[Setting]:
+    """All settings, the best first by the mean over seeds; of equals the first in order."""
+    accuracy = by_seed(results.rows)
+    return sorted(accuracy, key=lambda setting: (-np.mean(accuracy[setting]), setting))
+
+
+def verdicts_table(claims: Mapping[str, Sequence[Claim]]) -> Table:
+    """A line per claim, and its verdict for each kind of transitions."""
+    same = zip(*claims.values(), strict=True)
+    lines = [(judged[0].name, judged[0].text, *(claim.verdict for claim in judged)) for judged in same]
+    return ("claim", "the paper says", *(f"{transition} transitions" for transition in claims)), lines
+
+
+def claims_table(claims: Sequence[Claim]) -> Table:
+    """A line per statement."""
+    lines = [
+        ("" if number else claim.name, statement.text, *numbers_of(statement), statement.verdict)
+        for claim in claims
+        for number, statement in enumerate(claim.statements)
+    ]
+    return ("claim", "measured", "points", "95 %", "wanted", "this number"), lines
+
+
+def numbers_of(statement: Statement) -> tuple[str, str, str]:
+    """The number, its interval or why there is none, and what was wanted."""
+    found = statement.interval
+    number = "" if statement.values is None else f"{statement.values[0]:+.1f}"
+    return number, f"{found[0]:+.1f} to {found[1]:+.1f}" if found else statement.reason, statement.wanted
+
+
+def reading(sequences: int, seeds: int) -> str:
+    """How the verdicts are to be read."""
+    return (
+        f"Points are percent of the test frames, mean over {seeds} seeds. The interval is the middle 95 % of {DRAWS} "
+        f"draws of the {sequences} test sequences with replacement, the same draws on both sides of a difference; it "
+        "does not cover what other training sequences would change. A number holds if its whole interval is where it "
+        "is wanted, does not hold if the whole interval is elsewhere, and otherwise cannot be told. A claim holds if "
+        f"all its numbers hold. Fewer than {LEAST} test sequences tell nothing: by chance all may be on one side. A "
+        "best or worst cell is chosen on all sequences, so its number flatters. What several percent (2), little (2), "
+        f"among the best (1) and high ({HIGH:g} %) mean was set by placerec, not by the paper."
+    )
+
+
+def markdown(table: Table) -> str:
+    """A table as Markdown."""
+    header, lines = table
+    rows = [header, ["---"] * len(header), *lines]
+    return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |\n" for row in rows)
+
+
+def format_tables(results: Results) -> str:
+    """The text of tables.md."""
+    parts = [
+        "# Tables\n",
+        "## Labelled images per place and split\n",
+        markdown(images_table(results.folds)),
+        "## Frames in a row with the same word\n",
+        "Training sequences, mean over seeds and folds, cut at the ends of sequences.\n",
+        markdown(runs_table(results.rows)),
+        "## The best of the grid\n",
+        markdown(best_table(results)),
+    ]
+    return "\n".join(parts)
+
+
+def format_claims(claims: Mapping[str, Sequence[Claim]], note: str) -> str:
+    """The text of claims.md; `claims` by transition."""
+    parts = ["# The paper's claims\n", markdown(verdicts_table(claims)), note + "\n"]
+    for transition, judged in claims.items():
+        parts += [f"## With {transition} transitions\n", markdown(claims_table(judged))]
+    return "\n".join(parts)
 
 
 def write_reports(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob], out: Path) -> None:
@@ -53,23 +169,23 @@ def _contents(out: Path) -> dict[str, str]:
 
 
 def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob], out: Path) -> None:
-    note = tables.reading(len({name for row in results.rows for name in row.sequences}), plan.seeds)
+    note = reading(len({name for row in results.rows for name in row.sequences}), plan.seeds)
     claims = {transition: judge(results, transition) for transition in plan.transition}
-    write_text(out / "tables.md", tables.format_tables(results))
-    write_text(out / "claims.md", tables.format_claims(claims, note))
-    best = tables.ranked(results)[0]
+    write_text(out / "tables.md", format_tables(results))
+    write_text(out / "claims.md", format_claims(claims, note))
+    best = ranked(results)[0]
     body = [
         paragraph(_what(results, plan, config)),
         heading("Frames right"),
         *_figures(results, plan, out),
-        table(*tables.best_table(results), "The ten best of the grid, with what is right without any filter."),
+        table(*best_table(results), "The ten best of the grid, with what is right without any filter."),
         heading("The paper's claims"),
-        table(*tables.verdicts_table(claims), "Verdicts; the numbers are below."),
+        table(*verdicts_table(claims), "Verdicts; the numbers are below."),
         paragraph(note),
-        *(table(*tables.claims_table(claims[name]), f"With {name} transitions.") for name in claims),
+        *(table(*claims_table(claims[name]), f"With {name} transitions.") for name in claims),
         heading("The data"),
-        table(*tables.images_table(results.folds), "Labelled images per place and split."),
-        table(*tables.runs_table(results.rows), "Frames in a row with the same word, in training."),
+        table(*images_table(results.folds), "Labelled images per place and split."),
+        table(*runs_table(results.rows), "Frames in a row with the same word, in training."),
         *_closer_look(results, jobs),
         heading("Do it again"),
         preformatted(f"placerec experiment {shlex.quote(config.name)} -o {shlex.quote(out.resolve().name)}/"),
@@ -80,9 +196,6 @@ def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob]
         preformatted(_versions()),
     ]
     write_text(out / "report.html", html_page(f"placerec experiment: {config.stem}", body))
-
-
-_CAPTION = "Mean over seeds, with one standard deviation. Dotted: always the most frequent place. Dashed: naive Bayes."
 
 
 def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
@@ -124,7 +237,7 @@ def _beliefs(jobs: Sequence[GridJob], setting: Setting) -> list[Beliefs]:
 
 def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
     """Belief strips and confusion matrices of the best setting, and its words."""
-    best = tables.ranked(results)[0]
+    best = ranked(results)[0]
     beliefs = _beliefs(jobs, best)
     found = {best: evaluate(beliefs)}
     first = best._replace(order=min(row.order for row in results.rows))
