@@ -69,12 +69,7 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTi
 
 def tables_of(model: MutableModel, words: WordList) -> ScoreTables:
     """The tables that give words, by SRILM's number, the probabilities of a model."""
-    index = model.trie.vocabulary.index
-    numbers = np.full(len(index), -1)
-    for number, word in enumerate(words.words):
-        if word in index:
-            numbers[index[word]] = number
-    return model.tables(numbers, len(words.words))
+    return model.tables(words.numbers(model.trie.vocabulary), len(words.words))
 
 
 def _weights(model: MutableModel, blocks: Sequence[tuple[int, Block]], rows: Sequence[Sequence[Ints]]) -> list[Ints]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LOG_ZERO
-from placerec.srilm.text.fields import Fields, Packed, split_lines, with_odd_bytes
+from placerec.srilm.text.fields import FILLED, Fields, Packed, split_lines, with_odd_bytes
 
 # So many numbers are sooner converted one by one.
 _FEW = 200
@@ -98,7 +98,6 @@ _ZEROS = _every_byte(ord("0"))
 _BEHIND_NINE, _HIGH_BITS = _every_byte(0x80 - 10), _every_byte(0x80)
 _EVERY_FOURTH = np.uint64(0x000000FF000000FF)
 _HUNDREDS, _MILLIONS = np.uint64((1000000 << 32) + 100), np.uint64((10000 << 32) + 1)
-_FILLED = np.array([(1 << 8 * size) - 1 for size in range(9)], np.uint64)
 _SIGN, _POINT, _BYTE = ord("-"), ord("."), np.uint64(255)
 
 
@@ -111,7 +110,7 @@ def _short_decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     size = fields.lengths[at] - negative - 2
     text >>= np.uint64(8) * negative
     whole = (text & _BYTE) - np.uint64(ord("0"))
-    digits, plain = _eight_digits(fields.eights[start + 2], _FILLED.take(size, mode="clip"))
+    digits, plain = _eight_digits(fields.eights[start + 2], FILLED.take(size, mode="clip"))
     plain &= (whole <= 9) & (text >> np.uint64(8) & _BYTE == _POINT) & (size >= 0) & (size <= 8)
     # Both are exact, so that the quotient is the float64 nearest to the decimal number.
     value = (whole * np.uint64(10**8) + digits) / 1e8

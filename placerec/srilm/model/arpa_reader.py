@@ -59,14 +59,6 @@ class Reader:
     def say(self, message: str, level: int = 0) -> None:
         self.said.append((self.number, level, message))
 
-    def read(self) -> None:
-        """Read the file to `\\end\\`, or to what is wrong with it."""
-        try:
-            self.read_all()
-        except _FormatError as error:
-            self.failure = f"{self.position}{error}"
-            self.keep_lines()
-
     def finish(self, debug: int, what: str) -> None:
         """Say what is to be said at this debug level; SrilmError if the file could not be read."""
         for _, level, message in sorted(self.said, key=lambda said: said[0]):
@@ -76,18 +68,23 @@ class Reader:
             self.streams.say(self.failure)
             raise SrilmError(f"format error in {what} {self.name}")
 
-    def read_all(self) -> None:
+    def read(self) -> None:
+        """Read the file to `\\end\\`, or to what is wrong with it."""
         lines = self.streams.lines(self.name)
         blocks = lines.blocks(_BLOCK)
-        for data in blocks:
-            if b"\0" in data:
-                self.read_lines(lines, chain([data], blocks))
-                break
-            start = 0
-            while start < len(data) and self.state != "done":
-                start = self.read_some(data, start)
-        if self.state != "done":
-            raise _FormatError("reached EOF before \\end\\")
+        try:
+            for data in blocks:
+                if b"\0" in data:
+                    self.read_lines(lines, chain([data], blocks))
+                    break
+                start = 0
+                while start < len(data) and self.state != "done":
+                    start = self.read_some(data, start)
+            if self.state != "done":
+                raise _FormatError("reached EOF before \\end\\")
+        except _FormatError as error:
+            self.failure = f"{self.position}{error}"
+            self.keep_lines()
 
     def read_lines(self, lines: Lines, blocks: Iterable[bytes]) -> None:
         """Take all lines that are left one by one: NUL bytes join them."""
@@ -129,18 +126,15 @@ class Reader:
         weights = "zero" if n == self.top else "ignore" if n == self.order else "read"
         if (n == 1 and self.limited) or (self.words.lower and chunk != chunk.lower()):
             return None
-        return parse_block(chunk, n, self.added if n == 1 else self.known, weights=weights)
+        return parse_block(chunk, n, self.numbered, weights=weights)
 
-    def added(self, fields: Fields, at: Ints) -> Ints:
-        """SRILM's numbers of the fields `at`, which are added to the words where they are new."""
-        return np.array([self.words.add(fields.text(i).decode("latin-1")) for i in at.tolist()], np.int64)
-
-    def known(self, fields: Fields, at: Ints) -> Ints:
-        """SRILM's numbers of the fields `at`, -1 for words that are not listed."""
-        names = self.names
-        if names is None or names.size != len(self.words.index):
-            names = self.names = NameTable(self.words.index)
-        return names.find(fields, at)
+    def numbered(self, fields: Fields, at: Ints) -> Ints:
+        """SRILM's numbers of the fields `at`; unigrams are added to the words, others are -1 where they are new."""
+        if self.section == 1:
+            return np.array([self.words.add(fields.text(i).decode("latin-1")) for i in at.tolist()], np.int64)
+        if self.names is None or self.names.size != len(self.words.index):
+            self.names = NameTable(self.words.index)
+        return self.names.find(fields, at)
 
     def take(self, line: str) -> None:
         """Take one line in the state that the lines before have led to."""

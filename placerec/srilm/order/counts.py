@@ -41,8 +41,12 @@ class FirstSeen:
                     first[n - 1][row] = np.minimum(first[n - 1][row], now)
                 now += 1
         if self.text is not None:
-            for n, its in enumerate(first_positions(self.text, trie, sorted_number)):
-                first[n] = np.minimum(first[n], its + now)
+            for block, found in occurrences(self.text, trie, sorted_number):
+                for its, (position, row) in zip(first, found, strict=True):
+                    new = its[row] == NEVER
+                    # Of several values for one row the last is kept: reversed, the earliest.
+                    its[row[new][::-1]] = now + position[new][::-1]
+                now += len(block.ids)
         return first
 
     def walk(self, counts: NgramCounts) -> tuple[Ints, Ints]:
@@ -59,22 +63,6 @@ class FirstSeen:
             if n in texts:
                 lines.append(f"{texts[n][row]}\t{count % counts.counts[n - 1][row]}\n")
         return "".join(lines)
-
-
-def first_positions(text: StoredText, trie: Trie, renumbered: Ints) -> list[Ints]:
-    """Per order, where each n-gram first starts in a text: int64 (m_n,), the number of its words if nowhere.
-
-    `renumbered`: the number in `trie` of each word number of the text.
-    """
-    found = [np.full(len(keys), text.tokens) for keys in trie.keys]
-    before = 0
-    for block, its in occurrences(text, trie, renumbered):
-        for first, (position, row) in zip(found, its, strict=True):
-            new = first[row] == text.tokens
-            # Of several values for one row the last is kept: reversed, the earliest.
-            first[row[new][::-1]] = before + position[new][::-1]
-        before += len(block.ids)
-    return found
 
 
 class EstimationMessages(Messages):

@@ -21,7 +21,7 @@ _COMMENT = np.uint64(int.from_bytes(b"##", "little"))
 _HOLE = np.uint64(0)
 _TWO_BYTES = np.uint64(0xFFFF)
 # The bytes of a number that a field of so many bytes fills.
-_FILLED = np.array([(1 << 8 * size) - 1 for size in range(_EIGHT + 1)], np.uint64)
+FILLED = np.array([(1 << 8 * size) - 1 for size in range(_EIGHT + 1)], np.uint64)
 _SPREAD = np.array([0x9E3779B97F4A7C15 * (2 * i + 1) % 2**64 for i in range(LONGEST_NAME // _EIGHT)], np.uint64)
 
 
@@ -62,7 +62,7 @@ class Fields:
         """The first bytes of the fields `at` as so many numbers each, eight bytes in a number."""
         start, length = self.starts[at], self.lengths[at]
         return [
-            self.eights[start + place] & _FILLED[np.clip(length - place, 0, _EIGHT)]
+            self.eights[start + place] & FILLED[np.clip(length - place, 0, _EIGHT)]
             for place in range(0, _EIGHT * numbers, _EIGHT)
         ]
 
@@ -151,7 +151,7 @@ class NameTable:
         start, length = fields.starts[at], fields.lengths[at]
         # Of a longer name this is the start.
         name = fields.eights.take(start)
-        name &= _FILLED.take(length, mode="clip")
+        name &= FILLED.take(length, mode="clip")
         number = self.short.find(name.view(np.int64))
         if self.short_numbers is not None:
             number = self.short_numbers.take(number, mode="wrap")

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,25 +109,17 @@ def best_mix(
     (T,): how often each token occurs (default: once). The search ends when no weight moves by more than `precision`,
     or at once if there are no tokens. As SRILM's compute-best-mix.
     """
-    weights = np.array(start, np.float64)
-    steps = []
-    for step, moved in _improved(p, weights, np.ones(p.shape[1]) if counts is None else counts):
-        steps.append(step)
-        if float(np.abs(moved - step.weights).max()) <= precision:
-            return moved, steps
-    return weights, steps
-
-
-def _improved(p: Floats, weights: Floats, counts: Floats) -> Iterator[tuple[MixStep, Floats]]:
-    """Each step with the weights that it leads to, for as long as it is asked for."""
-    total = float(counts.sum())
+    counts = np.ones(p.shape[1]) if counts is None else counts
+    weights, total = np.array(start, np.float64), float(counts.sum())
     # What a token's probabilities have in common does not matter to the weights, and could be too small to divide by.
     common = p.max(axis=0, initial=0.0)
-    ratio = p / common
-    shift = float(np.log(common) @ counts)
+    ratio, shift = p / common, float(np.log(common) @ counts)
+    steps: list[MixStep] = []
     while total > 0:
         share = weights[:, None] * ratio
         mixed = np.maximum(share.sum(axis=0), np.finfo(np.float64).smallest_subnormal)
-        step = MixStep(weights, float(np.log(mixed) @ counts) + shift)
+        steps.append(MixStep(weights, float(np.log(mixed) @ counts) + shift))
         weights = (share / mixed) @ counts / total
-        yield step, weights
+        if float(np.abs(weights - steps[-1].weights).max()) <= precision:
+            break
+    return weights, steps

@@ -40,6 +40,7 @@ NAMES = {
     "gt": "GoodTuring",
 }
 MOST_NUMBERED = 9
+_PARAMETERS = ("discount1", "discount2", "discount3+")
 MODIFYING = "modifying {}-gram counts for Kneser-Ney smoothing"
 
 
@@ -74,24 +75,17 @@ def choose(options: Parsed, n: int, *, model_wanted: bool) -> Choice | None:
     method, many = given_method(options, suffix) if suffix else (None, 0)
     if many > 1:
         raise SrilmError(f"conflicting discounting options for order {n}", 2)
-    source = suffix
+    source = suffix if method else ""
+    method = method or given_method(options, "")[0] or ("gt" if model_wanted else None)
     if method is None:
-        method, _ = given_method(options, "")
-        source = ""
-    if method is None:
-        if not model_wanted:
-            return None
-        method = "gt"
+        return None
     value = options[method + source] if method in ("cdiscount", "addsmooth") else 0.0
-    file = (
-        options[("gt" if method == "gt" else "kn") + source] if method in ("gt", "kndiscount", "ukndiscount") else None
-    )
-    minimum = options[f"gt{n}min"] if suffix else options["gtmin"]
-    maximum = options[f"gt{n}max"] if suffix else options["gtmax"]
-    interpolate = options["interpolate"] or bool(suffix and options["interpolate" + suffix])
+    minimum, file = options[f"gt{suffix}min"], None
     if method in ("gt", "ukndiscount", "kndiscount"):
         minimum = float(math.trunc(minimum))
-    return Choice(method, value, file, minimum, maximum, interpolate)
+        file = options[("gt" if method == "gt" else "kn") + source]
+    interpolate = options["interpolate"] or options["interpolate" + suffix]
+    return Choice(method, value, file, minimum, options[f"gt{suffix}max"], interpolate)
 
 
 @dataclass
@@ -99,6 +93,7 @@ class Fitter:
     """Fits the discounts of all orders in turn; the Kneser-Ney methods change the lower orders of `counts`.
 
     `predictable` bool (V,): words that are predicted; `meta` int64 (V,): k where a word stands for k occurrences.
+    `late`: the orders whose parameters were read, and whose counts SRILM changes when estimation comes to them.
     """
 
     counts: NgramCounts
@@ -109,7 +104,7 @@ class Fitter:
     debug: int
     fractional: bool
     modified: set[int] = field(default_factory=set)
-    late: set[int] = field(default_factory=set)
+    late: list[int] = field(default_factory=list)
 
     def rule(self, n: int, choice: Choice, *, read: bool) -> Rule:
         """The rule of order n; with `read`, parameters come from the file. SrilmError if it cannot be fitted."""
@@ -139,7 +134,7 @@ class Fitter:
                 return Rule(natural, choice.interpolate, choice.minimum)
         if choice.file and read:
             if choice.method != "gt":
-                self.late.add(n)
+                self.late.append(n)
             return self._read(choice)
         if self.fractional:
             raise LanguageModelError("discounting method does not support float counts")
@@ -200,13 +195,6 @@ class Fitter:
         self.modified.add(n)
         return True
 
-    def prepare_late(self) -> list[int]:
-        """Change counts for the orders whose parameters were read, and return these orders.
-
-        SRILM does it when estimation comes to them.
-        """
-        return [n for n in sorted(self.late) if self.prepare(n, silent=True)]
-
     def _read(self, choice: Choice) -> Rule:
         """The rule that a parameter file gives; its mincount overrides the option."""
         numbers = _parameters(choice.file or "", self.streams)
@@ -215,14 +203,13 @@ class Fitter:
             top = int(numbers.get("maxcount", 0))
             factors = [1.0, *(float(numbers.get(f"discount {k}", 1.0)) for k in range(1, top + 1))]
             return _good_turing_rule(factors if top > 0 else None, minimum, choice.interpolate)
-        names = ("discount1", "discount2", "discount3+") if choice.method == "kndiscount" else ("discount1",)
+        names = _PARAMETERS if choice.method == "kndiscount" else _PARAMETERS[:1]
         return _kneser_ney_rule(tuple(float(numbers.get(name, 0.0)) for name in names), minimum, choice.interpolate)
 
 
 def _good_turing_rule(factors: Sequence[float] | None, minimum: float, interpolate: bool) -> Rule:
-    if factors is None:
-        return Rule(good_turing([1.0]), interpolate, minimum, exhaustible=minimum > 1)
-    return Rule(good_turing(factors), interpolate, minimum)
+    exhaustible = factors is not None or minimum > 1
+    return Rule(good_turing([1.0] if factors is None else factors), interpolate, minimum, exhaustible)
 
 
 def _kneser_ney_rule(discounts: Sequence[float], minimum: float, interpolate: bool) -> Rule:
@@ -231,12 +218,8 @@ def _kneser_ney_rule(discounts: Sequence[float], minimum: float, interpolate: bo
 
 
 def _kneser_ney_file(minimum: int, discounts: Sequence[float]) -> str:
-    if len(discounts) == 1:
-        return f"mincount {minimum}\ndiscount1 {discounts[0]:.16g}\n"
-    lines = [
-        f"{name} {value:.16f}\n"
-        for name, value in zip(("discount1", "discount2", "discount3+"), discounts, strict=True)
-    ]
+    number = ".16g" if len(discounts) == 1 else ".16f"
+    lines = [f"{name} {value:{number}}\n" for name, value in zip(_PARAMETERS, discounts, strict=False)]
     return f"mincount {minimum}\n" + "".join(lines)
 
 

@@ -1,7 +1,6 @@
 """`ngram`: scores text with models, and mixes and prunes them; sections 8 to 11 of our SRILM specification."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +14,6 @@ from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.text.vocabulary import PAUSE, WordList, format_words, read_aliases, read_words
 from placerec.srilm.tools.options import Option, Options, Parsed, parse
 from placerec.srilm.tools.reports import TOKENS, Counting, Printer, print_counts, print_perplexity
-
-if TYPE_CHECKING:
-    from placerec.srilm.tools.ngram_models import Models
 
 TOOL = "ngram"
 
@@ -104,14 +100,8 @@ OPTIONS: Options = {
         "servers are not specified",
         use_server="string", server_port="unsigned", server_maxclients="unsigned", cache_served_ngrams="flag",
     ),
-    **_refuse(
-        "binary formats are not specified; use ARPA files",
-        write_bin_lm="string", write_oldbin_lm="string",
-    ),
-    **_refuse(
-        "quantised models are not specified",
-        quantize="unsigned", codebook="string",
-    ),
+    **_refuse("binary formats are not specified; use ARPA files", write_bin_lm="string", write_oldbin_lm="string"),
+    **_refuse("quantised models are not specified", quantize="unsigned", codebook="string"),
     **_refuse("skip n-gram models are not specified", skip="flag"),
     **_refuse("variance pruning is not specified", varprune="float"),
     **_refuse(
@@ -123,8 +113,7 @@ OPTIONS: Options = {
         "N-best lists are not specified",
         nbest="string", rescore="string", nbest_files="string", write_nbest_dir="string", max_nbest="unsigned",
         decipher_lm="string", decipher_order="unsigned", decipher_nounk="flag", decipher_lmw="float",
-        decipher_wtw="float", rescore_lmw="float", rescore_wtw="float", split_multiwords="flag",
-        no_reorder="flag",
+        decipher_wtw="float", rescore_lmw="float", rescore_wtw="float", split_multiwords="flag", no_reorder="flag",
     ),
     **_refuse("its output is not specified", memuse="flag"),
 }  # fmt: skip
@@ -164,40 +153,32 @@ class _Run:
     def run(self) -> None:
         """Sections 9.1 to 9.10, in this order."""
         options = self.options
-        models = None if options["debug"] <= TOKENS and options.given <= _SCORING else self.models()
-        scorer = models.scorer() if models else self.scorer()
-        self.words = models.words if models else self.words
+        models = None
+        if options["debug"] <= TOKENS and options.given <= _SCORING:
+            debug, limited = options["debug"], options["limit-vocab"]
+            tables = read_tables(
+                options["lm"], self.words, self.streams, order=self.order, debug=debug, limited=limited
+            )
+            scorer: Scorer = Model(lambda: tables, self.words)
+        else:
+            from placerec.srilm.tools.ngram_models import Models
+
+            models = Models(options, self.words, self.streams)
+            scorer, self.words = models.scorer(), models.words
         handling = self.handling()
         printer = Printer(self.words, self.streams, options["debug"])
         if options["ppl"]:
             print_perplexity(options["ppl"], scorer, printer, handling, whole=options["cache"] > 0)
         if options["counts"]:
-            self.print_counts(scorer, printer)
+            order = options["count-order"] or self.order
+            counting = Counting(order, options["float-counts"], options["counts-entropy"], options["escape"])
+            print_counts(options["counts"], scorer, printer, counting)
         if options["gen"]:
             self.generate(scorer)
         if models and options["write-lm"]:
             models.write(options["write-lm"])
         if options["write-vocab"]:
             self.streams.write(options["write-vocab"], format_words(self.words))
-
-    def models(self) -> "Models":
-        """The models that are mixed, changed or written."""
-        from placerec.srilm.tools.ngram_models import Models
-
-        return Models(self.options, self.words, self.streams)
-
-    def scorer(self) -> Scorer:
-        """The model of -lm, which is only asked for probabilities."""
-        options = self.options
-        tables = read_tables(
-            options["lm"],
-            self.words,
-            self.streams,
-            order=self.order,
-            debug=options["debug"],
-            limited=options["limit-vocab"],
-        )
-        return Model(lambda: tables, self.words)
 
     def read_words(self) -> WordList:
         """The words that the options name."""
@@ -229,13 +210,6 @@ class _Run:
             verbose=options["debug"] >= 1,
             noise=frozenset(noise),
         )
-
-    def print_counts(self, scorer: Scorer, printer: Printer) -> None:
-        """Score the n-grams of the counts file of `-counts`, and print what `-debug` asks for."""
-        options = self.options
-        order = options["count-order"] or self.order
-        counting = Counting(order, options["float-counts"], options["counts-entropy"], options["escape"])
-        print_counts(options["counts"], scorer, printer, counting)
 
     def generate(self, scorer: Scorer) -> None:
         """`-gen`: sentences drawn from the model, behind each prefix if there are some."""

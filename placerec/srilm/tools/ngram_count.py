@@ -100,7 +100,11 @@ def _run(options: Parsed, streams: Streams) -> None:
         raise SrilmError("conflicting default discounting options", 2)
     words = _read_vocabulary(options, streams)
     counts, first = _read_all(options, words, streams)
-    fitter = _fitter(options, counts, words, streams)
+    vocabulary = counts.trie.vocabulary
+    meta = meta_occurrences(vocabulary.words, options["meta-tag"])
+    meta_words = np.array([words.is_meta(word) for word in vocabulary.words], bool)
+    predictable = ~vocabulary.mask(words.non_events) & ~meta_words
+    fitter = Fitter(counts, predictable, meta, options, streams, options["debug"], options["float-counts"])
     rules = []
     wanted = options["lm"] is not None
     for n in range(1, max(1, options["order"]) + 1):
@@ -179,21 +183,12 @@ def _read_text(options: Parsed, words: WordList, streams: Streams) -> StoredText
     return text
 
 
-def _fitter(options: Parsed, counts: NgramCounts, words: WordList, streams: Streams) -> Fitter:
-    vocabulary = counts.trie.vocabulary
-    meta = meta_occurrences(vocabulary.words, options["meta-tag"])
-    meta_words = np.array([words.is_meta(word) for word in vocabulary.words], bool)
-    predictable = ~vocabulary.mask(words.non_events) & ~meta_words
-    return Fitter(counts, predictable, meta, options, streams, options["debug"], options["float-counts"])
-
-
 def _write_model(
     options: Parsed, fitter: Fitter, rules: Sequence[Rule], words: WordList, first: FirstSeen, streams: Streams
 ) -> None:
     if options["order"] < 1:
         streams.say("LM order must be positive -- set to 1")
-    late = fitter.prepare_late()
-    announced = {n: MODIFYING.format(n) for n in late}
+    announced = {n: MODIFYING.format(n) for n in fitter.late if fitter.prepare(n, silent=True)}
     trace = EstimationMessages(fitter.counts, first, streams, options["debug"], announced=announced)
     mutable = estimate_mutable(
         fitter.counts,
@@ -219,23 +214,18 @@ def _write_model(
 
 def _write_rest(options: Parsed, counts: NgramCounts, words: WordList, first: FirstSeen, streams: Streams) -> None:
     """Vocabularies and counts, in SRILM's order; counts on standard output if nothing else is written."""
-    number = "%.16g" if options["float-counts"] else "%d"
-
-    def show(only: int | None) -> str:
-        if options["sort"]:
-            return format_counts(counts, only=only, count=number)
-        return first.format(counts, only=only, count=number)
-
+    formatted = partial(format_counts if options["sort"] else first.format, counts)
+    show = partial(formatted, count="%.16g" if options["float-counts"] else "%d")
     if options["write-vocab"]:
         streams.write(options["write-vocab"], format_words(words))
     if options["write-vocab-index"]:
         streams.write(options["write-vocab-index"], format_indices(words))
     orders = [n for n in range(1, 10) if options[f"write{n}"]]
     for n in orders:
-        streams.write(options[f"write{n}"], show(n) if n <= counts.order else "")
+        streams.write(options[f"write{n}"], show(only=n) if n <= counts.order else "")
     files = [name for name in options.given if name.startswith(("kn", "gt")) and name[2:] in ("", *"123456789")]
     silent = orders or files or any(options[name] for name in ("lm", "write-vocab", "write-vocab-index", "write-text"))
     target = options["write"] or (None if silent else "-")
     if target:
         only = options["write-order"] or None
-        streams.write(target, show(only) if only is None or only <= counts.order else "")
+        streams.write(target, show(only=only) if only is None or only <= counts.order else "")

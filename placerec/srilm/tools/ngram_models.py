@@ -37,7 +37,10 @@ class Models:
             scorer: Scorer = partial(Null, self.words)
         else:
             self.mutable, self.times = self.read("lm", "lm file")
-            scorer = self.with_cache(self.mixed())
+            scorer = self.mixed()
+            if self.options["cache"]:
+                self.mutable = None
+                scorer = partial(Cached, scorer, self.words, self.options["cache"], self.options["cache-lambda"])
         scorer = self.lenient(scorer)
         return self.rescored(scorer) if self.options["rescore-ngram"] else scorer
 
@@ -112,7 +115,12 @@ class Models:
             reweigh(mutable, self.messages(mutable), minimum=least if least is not None and 0 <= least <= 1 else None)
             self.mutable = mutable
         if options["prune"] > 0:
-            mutable, history = self.pruned_by()
+            history = None
+            if options["prune-history-lm"]:
+                history, _ = self.read("prune-history-lm", "history LM file", order=max(1, self.order - 1))
+                mutable, history = self.together(self.model(), history)
+            else:
+                (mutable,) = self.together(self.model())
             trace = self.messages(mutable)
             prune(mutable, options["prune"], shortest=options["minprune"], history=history, trace=trace)
             self.mutable = mutable
@@ -120,21 +128,6 @@ class Models:
             (mutable,) = self.together(self.model())
             prune_improbable(mutable, shortest=options["minprune"], trace=self.messages(mutable))
             self.mutable = mutable
-
-    def pruned_by(self) -> tuple[MutableModel, MutableModel | None]:
-        """The model to prune and the one that says how probable contexts are."""
-        if not self.options["prune-history-lm"]:
-            return self.together(self.model())[0], None
-        history, _ = self.read("prune-history-lm", "history LM file", order=max(1, self.order - 1))
-        mutable, wider = self.together(self.model(), history)
-        return mutable, wider
-
-    def with_cache(self, scorer: Scorer) -> Scorer:
-        """`-cache`."""
-        if not self.options["cache"]:
-            return scorer
-        self.mutable = None
-        return partial(Cached, scorer, self.words, self.options["cache"], self.options["cache-lambda"])
 
     def lenient(self, scorer: Scorer) -> Scorer:
         """`-zeroprob-word` and `-unk-prob`."""

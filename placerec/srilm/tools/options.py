@@ -75,32 +75,18 @@ def parse(tool: str, options: Options, arguments: Sequence[str], streams: Stream
 
 
 def _take(parsed: Parsed, name: str, option: Option, argument: str, text: str, streams: Streams) -> None:
-    if option.kind == "string":
-        parsed.values[name] = text
+    value: Any = text if option.kind == "string" else (leading_float if option.kind == "float" else leading_int)(text)
+    if value is None and option.kind == "float":
+        wrong = f'non-floating-point argument "{text}".  Using default: {option.default or 0:g}.'
+    elif value is None:
+        wrong = f'a non-numeric argument "{text}".  Using default: {option.default}'
+    elif option.kind == "unsigned" and value < 0:
+        wrong = f'a negative argument "{text}".  Using default: {option.default}.'
+    else:
+        parsed.values[name] = value
         parsed.given.add(name)
         return
-    if option.kind == "float":
-        value = leading_float(text)
-        if value is None:
-            shown = "%g" % (option.default or 0)
-            streams.say(
-                f'Warning: option "{argument}" got non-floating-point argument "{text}".  Using default: {shown}.'
-            )
-            return
-    else:
-        value = leading_int(text)
-        if value is None:
-            streams.say(
-                f'Warning: option "{argument}" got a non-numeric argument "{text}".  Using default: {option.default}'
-            )
-            return
-        if option.kind == "unsigned" and value < 0:
-            streams.say(
-                f'Warning: option "{argument}" got a negative argument "{text}".  Using default: {option.default}.'
-            )
-            return
-    parsed.values[name] = value
-    parsed.given.add(name)
+    streams.say(f'Warning: option "{argument}" got {wrong}')
 
 
 def usage(tool: str, options: Options) -> str:
