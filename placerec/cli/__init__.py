@@ -57,7 +57,9 @@ class Commands(click.Group):
             raise Failure(f"not enough memory ({error}); give less at a time") from error
 
 
-@click.group(cls=Commands, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Commands, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "show_default": True}
+)
 @click.version_option(__version__, prog_name="placerec")
 def commands() -> None:
     """Which place is the camera in? Images become words, places become language models."""

@@ -5,46 +5,34 @@ from typing import Any
 
 import click
 
-from placerec.cli.options import (
-    FILE,
-    PATH,
-    jobs_option,
-    log,
-    output_option,
-    progress_bar,
-    reading_options,
-    seed_option,
-    size_option,
-    talk_options,
-    usage,
-)
+from placerec.cli import shared
 
 
 @click.command(epilog="Example: placerec compare RUNS/ --test RUNS/run3 --test RUNS/run7 -o out/")
-@click.argument("train", metavar="TRAIN...", nargs=-1, required=True, type=PATH)
+@click.argument("train", metavar="TRAIN...", nargs=-1, required=True, type=shared.PATH)
 @click.option(
     "--test",
     "tests",
     metavar="SEQUENCE",
     multiple=True,
     required=True,
-    type=PATH,
+    type=shared.PATH,
     help="What to test on; left out of TRAIN if it is there.  [repeatable]",
 )
 @click.option("--methods", metavar="A,B,...", help="Only these methods.  [default: all]")
-@size_option(20)
-@seed_option("Another seed, another map.")
+@shared.size_option(20)
+@shared.seed_option("Another seed, another map.")
 @click.option(
     "--cache",
     metavar="DIR",
-    type=PATH,
+    type=shared.PATH,
     help="Where descriptors, words and models are kept for the next run.  [default: out/cache]",
 )
-@reading_options()
-@output_option(
+@shared.reading_options()
+@shared.output_option(
     "out/", "The folder to write: methods.csv, pairs.csv, methods.png, beliefs/; a second run goes on there."
 )
-@talk_options
+@shared.talk_options
 def compare(train: tuple[Path, ...], tests: tuple[Path, ...], methods: str | None, out: Path, **how: Any) -> None:
     """Run every method on the same test sequences.
 
@@ -55,17 +43,17 @@ def compare(train: tuple[Path, ...], tests: tuple[Path, ...], methods: str | Non
     from placerec.experiments.comparison.run import check_methods
     from placerec.experiments.comparison.run import compare as run
 
-    with usage("--methods"):
+    with shared.usage("--methods"):
         chosen = check_methods(None if methods is None else methods.split(","))
-    found = run(train, tests, out, methods=chosen, progress=progress_bar, **how)
+    found = run(train, tests, out, methods=chosen, progress=shared.progress_bar, **how)
     click.echo(format_comparison(found))
 
 
 @click.command(epilog="Example: placerec experiment grid.toml -o results/")
-@click.argument("config", metavar="CONFIG.toml", type=FILE)
-@output_option("results/", "The folder to write; what it holds from before is used again.")
-@jobs_option
-@talk_options
+@click.argument("config", metavar="CONFIG.toml", type=shared.FILE)
+@shared.output_option("results/", "The folder to write; what it holds from before is used again.")
+@shared.jobs_option
+@shared.talk_options
 def experiment(config: Path, out: Path, jobs: int | None) -> None:
     """Run the paper's grid of experiments, or another.
 
@@ -87,21 +75,20 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
     from placerec.experiments.grid.run import experiment as run
     from placerec.jobs import processors
 
-    results = run(config, out, jobs=jobs or processors(), progress=progress_bar)
-    log.info("%s: %d rows; now open %s", out / "results.csv", len(results.rows), out / "report.html")
+    results = run(config, out, jobs=jobs or processors(), progress=shared.progress_bar)
+    shared.log.info("%s: %d rows; now open %s", out / "results.csv", len(results.rows), out / "report.html")
 
 
 @click.command(epilog="Example: placerec lab LAB/ --scale tiny --seed 1")
-@click.argument("out", metavar="OUT/", type=PATH)
+@click.argument("out", metavar="OUT/", type=shared.PATH)
 @click.option(
     "--scale",
     type=click.Choice(["tiny", "small", "paper"]),
     default="small",
-    show_default=True,
     help="How many frames: about 900, 2400 or 16 500.",
 )
-@seed_option("Another seed, another laboratory.")
-@talk_options
+@shared.seed_option("Another seed, another laboratory.")
+@shared.talk_options
 def lab(out: Path, scale: str, seed: int) -> None:
     """Render the synthetic laboratory, in COLD's layout.
 
@@ -109,15 +96,15 @@ def lab(out: Path, scale: str, seed: int) -> None:
     """
     from placerec.lab.layout import render_lab
 
-    with progress_bar("render") as progress:
+    with shared.progress_bar("render") as progress:
         frames = render_lab(out, scale=scale, seed=seed, progress=progress)
-    log.info("%s: 18 sequences, %d synthetic frames", out, frames)
+    shared.log.info("%s: 18 sequences, %d synthetic frames", out, frames)
 
 
 @click.command(epilog="Example: placerec demo")
-@output_option("demo/", "The folder to write.  [default: demo/]", required=False)
-@seed_option("Seed of the laboratory and the map.")
-@talk_options
+@shared.output_option("demo/", "The folder to write.  [default: demo/]", required=False)
+@shared.seed_option("Seed of the laboratory and the map.")
+@shared.talk_options
 def demo(out: Path | None, seed: int) -> None:
     """Run all of it on the synthetic laboratory.
 
@@ -126,6 +113,6 @@ def demo(out: Path | None, seed: int) -> None:
     from placerec.demo import format_results, run_demo
 
     out = out or Path("demo")
-    results = run_demo(out, seed=seed, progress=progress_bar)
+    results = run_demo(out, seed=seed, progress=shared.progress_bar)
     click.echo(format_results(results))
-    log.info("\nNow open %s", out / "report.html")
+    shared.log.info("\nNow open %s", out / "report.html")

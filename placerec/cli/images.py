@@ -5,32 +5,15 @@ from typing import Any
 
 import click
 
-from placerec.cli.options import (
-    FILE,
-    PATH,
-    FiniteRange,
-    descriptor_options,
-    echo_json,
-    json_option,
-    matrix_option,
-    output_option,
-    progress_bar,
-    reading_options,
-    seed_option,
-    size_option,
-    source_arguments,
-    talk_options,
-    words_option,
-    work_options,
-)
+from placerec.cli import shared
 
 
 @click.command(epilog="Example: placerec describe COLD/seq1_cloudy1 -o descriptors.npz")
-@source_arguments
-@descriptor_options
-@output_option("descriptors.npz", "The file to write: arrays descriptors, frames, sequences, places, times.")
-@work_options
-@talk_options
+@shared.source_arguments
+@shared.descriptor_options
+@shared.output_option("descriptors.npz", "The file to write: arrays descriptors, frames, sequences, places, times.")
+@shared.work_options
+@shared.talk_options
 def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
     """Write the descriptor of every frame.
 
@@ -40,65 +23,53 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
     """
     from placerec.vision import describe_sources
 
-    with progress_bar("describe") as progress:
+    with shared.progress_bar("describe") as progress:
         describe_sources(sources, out, progress=progress, **how)
 
 
 @click.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
-@source_arguments
-@size_option(10)
-@click.option(
-    "--components",
-    type=click.IntRange(min=1),
-    default=80,
-    show_default=True,
-    help="Principal components that the map sees.",
-)
-@seed_option("Another seed, another map.")
+@shared.source_arguments
+@shared.size_option(10)
+@click.option("--components", type=click.IntRange(min=1), default=80, help="Principal components that the map sees.")
+@shared.seed_option("Another seed, another map.")
 @click.option(
     "--fraction",
-    type=FiniteRange(0, 1, min_open=True),
+    type=shared.FiniteRange(0, 1, min_open=True),
     default=1.0,
-    show_default=True,
     help="Share of the frames to train on, drawn by the seed.",
 )
 @click.option(
-    "--epochs",
-    type=click.IntRange(min=1),
-    help="Passes over the frames.  [default: 50, or fewer if the words settle]",
+    "--epochs", type=click.IntRange(min=1), help="Passes over the frames.  [default: 50, or fewer if the words settle]"
 )
 @click.option(
     "--units",
     type=click.Choice(["live", "all"]),
     default="live",
-    show_default=True,
     help="Whether units that no training frame hit can be words.",
 )
 @click.option(
     "--rule",
     type=click.Choice(["batch", "online"]),
     default="batch",
-    show_default=True,
     help="All frames at once, or Kohonen's one after the other (slow, for comparison).",
 )
 @click.option(
     "--width",
-    type=FiniteRange(min=0, min_open=True),
+    type=shared.FiniteRange(min=0, min_open=True),
     default=0.5,
-    show_default=True,
     help="Final width of the neighbourhood, in units; it starts at size/2.",
 )
 @click.option(
     "--held-out",
     metavar="SOURCE",
     multiple=True,
-    type=PATH,
+    type=shared.PATH,
     help="Images that train nothing: how well the map represents them is told.  [repeatable]",
 )
-@descriptor_options
-@output_option("words.npz", "The dictionary to write.")
-@work_options
-@talk_options
+@shared.descriptor_options
+@shared.output_option("words.npz", "The dictionary to write.")
+@shared.work_options
+@shared.talk_options
 def train_words(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
     """Learn visual words: PCA and a map of descriptors.
 
@@ -111,17 +82,17 @@ def train_words(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
     from placerec.vision import DictionaryOptions, train_dictionary
 
     options = DictionaryOptions(**{field.name: how.pop(field.name) for field in fields(DictionaryOptions)})
-    with progress_bar("describe") as progress:
+    with shared.progress_bar("describe") as progress:
         train_dictionary(sources, out, options=options, progress=progress, **how)
 
 
 @click.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")
-@source_arguments
-@words_option(True, "The dictionary of train-words.")
-@matrix_option
-@output_option("tokens/", "The folder to write: one .tsv per sequence, and vocab.txt.")
-@work_options
-@talk_options
+@shared.source_arguments
+@shared.words_option(True, "The dictionary of train-words.")
+@shared.matrix_option
+@shared.output_option("tokens/", "The folder to write: one .tsv per sequence, and vocab.txt.")
+@shared.work_options
+@shared.talk_options
 def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> None:
     """Write the visual word of every frame.
 
@@ -132,17 +103,17 @@ def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> N
     """
     from placerec.words.tokenize import tokenize as run
 
-    with progress_bar("tokenize") as progress:
+    with shared.progress_bar("tokenize") as progress:
         run(sources, words, out, progress=progress, **how)
 
 
 @click.command("show-words", epilog="Example: placerec show-words words.npz RUNS/ -o words.png")
-@click.argument("words", metavar="words.npz", type=FILE)
-@source_arguments
-@matrix_option
-@output_option("words.png", "Draw all words on one sheet: .png, .svg or .pdf.", required=False)
-@json_option("Print JSON, with a row for every unit of the map.")
-@talk_options
+@click.argument("words", metavar="words.npz", type=shared.FILE)
+@shared.source_arguments
+@shared.matrix_option
+@shared.output_option("words.png", "Draw all words on one sheet: .png, .svg or .pdf.", required=False)
+@shared.json_option("Print JSON, with a row for every unit of the map.")
+@shared.talk_options
 def show_words(words: Path, sources: tuple[Path, ...], out: Path | None, as_json: bool, **how: Any) -> None:
     """Show the typical frame and place of each word.
 
@@ -153,19 +124,19 @@ def show_words(words: Path, sources: tuple[Path, ...], out: Path | None, as_json
     from placerec.inspection.word_sheet import show_words as run
     from placerec.inspection.words import format_words
 
-    with progress_bar("describe") as progress:
+    with shared.progress_bar("describe") as progress:
         table = run(words, sources, out, progress=progress, **how)
-    echo_json(table.to_json()) if as_json else click.echo(format_words(table))
+    shared.echo_json(table.to_json()) if as_json else click.echo(format_words(table))
 
 
 @click.command("show-frame", epilog="Example: placerec show-frame frame.png -w words.npz -o seen.png")
-@click.argument("image", metavar="IMAGE", type=FILE)
-@click.argument("sources", metavar="[SOURCE...]", nargs=-1, type=PATH)
-@reading_options()
-@words_option(True, "The dictionary of train-words.")
-@output_option("seen.png", "Draw what the descriptor sees: .png, .svg or .pdf.", required=False)
-@json_option()
-@talk_options
+@click.argument("image", metavar="IMAGE", type=shared.FILE)
+@click.argument("sources", metavar="[SOURCE...]", nargs=-1, type=shared.PATH)
+@shared.reading_options()
+@shared.words_option(True, "The dictionary of train-words.")
+@shared.output_option("seen.png", "Draw what the descriptor sees: .png, .svg or .pdf.", required=False)
+@shared.json_option()
+@shared.talk_options
 def show_frame(
     image: Path, sources: tuple[Path, ...], words: Path, out: Path | None, as_json: bool, **how: Any
 ) -> None:
@@ -178,18 +149,18 @@ def show_frame(
     from placerec.inspection.frame import format_frame
     from placerec.inspection.frame import show_frame as run
 
-    with progress_bar("describe") as progress:
+    with shared.progress_bar("describe") as progress:
         view = run(image, words, sources, out, progress=progress, **how)
-    echo_json(view.to_json()) if as_json else click.echo(format_frame(view))
+    shared.echo_json(view.to_json()) if as_json else click.echo(format_frame(view))
 
 
 @click.command(epilog="Example: placerec stability RUNS/ -w words.npz -o stability.png")
-@source_arguments
-@words_option(True, "The dictionary of train-words.")
-@seed_option("Seed of the noise.")
-@output_option("stability.png", "Draw the table as bars: .png, .svg or .pdf.", required=False)
-@json_option()
-@talk_options
+@shared.source_arguments
+@shared.words_option(True, "The dictionary of train-words.")
+@shared.seed_option("Seed of the noise.")
+@shared.output_option("stability.png", "Draw the table as bars: .png, .svg or .pdf.", required=False)
+@shared.json_option()
+@shared.talk_options
 def stability(sources: tuple[Path, ...], words: Path, out: Path | None, as_json: bool, **how: Any) -> None:
     """Measure how stable the words are.
 
@@ -200,6 +171,6 @@ def stability(sources: tuple[Path, ...], words: Path, out: Path | None, as_json:
     from placerec.inspection.word_stability import format_stability
     from placerec.inspection.word_stability import stability as run
 
-    with progress_bar("stability") as progress:
+    with shared.progress_bar("stability") as progress:
         found = run(sources, words, out, progress=progress, **how)
-    echo_json(found.to_json()) if as_json else click.echo(format_stability(found))
+    shared.echo_json(found.to_json()) if as_json else click.echo(format_stability(found))

@@ -10,23 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from placerec.cli.options import (
-    FILE,
-    PATH,
-    PATH_OR_STREAM,
-    FiniteRange,
-    cluster_option,
-    decoding_options,
-    echo_json,
-    json_option,
-    output_option,
-    progress_bar,
-    reading_options,
-    talk_options,
-    tokens_argument,
-    usage,
-    words_option,
-)
+from placerec.cli import shared
 
 if TYPE_CHECKING:
     from placerec.jobs import Executor
@@ -55,47 +39,42 @@ INSPECT_EXAMPLES = """\b
 Example: placerec inspect model/kitchen.arpa "w07 w08"
          placerec inspect beliefs/run3.explain.jsonl 153 -o decision.html
 """
-_model_argument = click.argument("model", metavar="MODEL/", type=PATH)
+_model_argument = click.argument("model", metavar="MODEL/", type=shared.PATH)
 
 
 @click.command("train-lm", epilog="Example: placerec train-lm tokens/seq*[12].tsv -o model/ --order 2")
-@tokens_argument
-@click.option(
-    "--order", type=click.IntRange(1, 9), default=2, show_default=True, help="n-gram order; 1 is the classical HMM."
-)
+@shared.tokens_argument
+@click.option("--order", type=click.IntRange(1, 9), default=2, help="n-gram order; 1 is the classical HMM.")
 @click.option(
     "--smoothing",
     type=click.Choice(SMOOTHING_NAMES),
     default="witten-bell",
-    show_default=True,
     help="How unseen n-grams get their probability.",
 )
 @click.option(
     "--delta",
-    type=FiniteRange(0, min_open=True),
+    type=shared.FiniteRange(0, min_open=True),
     help="What lidstone adds to every count  [default: 1], or absolute takes off it  [default: 0.5].",
 )
 @click.option(
     "--select",
     default="none",
-    show_default=True,
     metavar="RULE",
     help="Which words count: none (all), unique (one a run), subsample:S (one in S), compress:M (runs by M).",
 )
 @click.option(
     "--min-count",
     default="1",
-    show_default=True,
     metavar="N[,N...]|srilm",
     help="Per order, how often an n-gram must occur to be listed; srilm is 1,1,2.",
 )
+@click.option("--markers/--no-markers", default=False, help="Whether to count <s> and </s> around visits.")
 @click.option(
-    "--markers/--no-markers", default=False, show_default=True, help="Whether to count <s> and </s> around visits."
+    "--vocab", metavar="FILE", type=shared.PATH, help="All words, one a line.  [default: vocab.txt beside TOKENS]"
 )
-@click.option("--vocab", metavar="FILE", type=PATH, help="All words, one a line.  [default: vocab.txt beside TOKENS]")
-@output_option("MODEL/", "The folder to write: one ARPA file per place, and what made it.")
-@cluster_option
-@talk_options
+@shared.output_option("MODEL/", "The folder to write: one ARPA file per place, and what made it.")
+@shared.cluster_option
+@shared.talk_options
 def train_lm(
     tokens: tuple[Path, ...],
     select: str,
@@ -113,20 +92,20 @@ def train_lm(
     from placerec.model import train_lm as run
     from placerec.words import parse_selection
 
-    with usage("--min-count"):
+    with shared.usage("--min-count"):
         minima = parse_min_count(min_count)
-    with usage("--select"):
+    with shared.usage("--select"):
         selection = parse_selection(select)
     chosen = ModelOptions(min_count=minima, select=selection, **options)
-    with progress_bar("train-lm") as progress:
+    with shared.progress_bar("train-lm") as progress:
         run(tokens, out, options=chosen, vocabulary=vocab, work=work, progress=progress)
 
 
 @click.command(epilog="Example: placerec update model/ tokens/today.tsv")
 @_model_argument
-@tokens_argument
+@shared.tokens_argument
 @click.option("--forget", is_flag=True, help="Take these sequences away instead; they must have been learned.")
-@talk_options
+@shared.talk_options
 def update(model: Path, tokens: tuple[Path, ...], forget: bool) -> None:
     """Learn more labelled visits, or forget some.
 
@@ -135,15 +114,15 @@ def update(model: Path, tokens: tuple[Path, ...], forget: bool) -> None:
     """
     from placerec.model import update as run
 
-    with progress_bar("update") as progress:
+    with shared.progress_bar("update") as progress:
         run(model, tokens, forget=forget, progress=progress)
 
 
 @click.command(epilog="Example: placerec calibrate model/ tokens/run4.tsv tokens/run5.tsv")
 @_model_argument
-@tokens_argument
-@decoding_options()
-@talk_options
+@shared.tokens_argument
+@shared.decoding_options
+@shared.talk_options
 def calibrate(model: Path, tokens: tuple[Path, ...], options: "Decoding") -> None:
     """Learn how far the beliefs of a model can be trusted.
 
@@ -161,14 +140,12 @@ def calibrate(model: Path, tokens: tuple[Path, ...], options: "Decoding") -> Non
 
 
 @click.command(epilog=INSPECT_EXAMPLES)
-@click.argument("path", metavar="MODEL.arpa|NAME.explain.jsonl", type=PATH)
+@click.argument("path", metavar="MODEL.arpa|NAME.explain.jsonl", type=shared.PATH)
 @click.argument("asked", metavar="[NGRAM...|FRAME]", nargs=-1)
-@click.option(
-    "--top", type=click.IntRange(min=0), default=5, show_default=True, help="How many n-grams of each order to show."
-)
-@json_option()
-@output_option("FILE.html", "A page of the decision to write, too.", required=False)
-@talk_options
+@click.option("--top", type=click.IntRange(min=0), default=5, help="How many n-grams of each order to show.")
+@shared.json_option()
+@shared.output_option("FILE.html", "A page of the decision to write, too.", required=False)
+@shared.talk_options
 def inspect(path: Path, asked: tuple[str, ...], top: int, as_json: bool, out: Path | None) -> None:
     """Read a model, or one decision of `decode --explain`.
 
@@ -186,7 +163,7 @@ def inspect(path: Path, asked: tuple[str, ...], top: int, as_json: bool, out: Pa
 
         found = inspect_model(path, asked, top=top)
         text = format_inspection(found)
-    echo_json(found) if as_json else click.echo(text)
+    shared.echo_json(found) if as_json else click.echo(text)
 
 
 def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[object, str]:
@@ -201,9 +178,9 @@ def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[obj
 
 
 @click.command(epilog="Example: placerec check model/*.arpa")
-@click.argument("models", metavar="MODEL.arpa...", nargs=-1, required=True, type=PATH)
-@json_option()
-@talk_options
+@click.argument("models", metavar="MODEL.arpa...", nargs=-1, required=True, type=shared.PATH)
+@shared.json_option()
+@shared.talk_options
 def check(models: tuple[Path, ...], as_json: bool) -> None:
     """Check that a model sums to 1 and agrees with KenLM.
 
@@ -224,35 +201,27 @@ def check(models: tuple[Path, ...], as_json: bool) -> None:
 
 
 @click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
-@click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH_OR_STREAM)
-@click.option("-m", "--model", metavar="MODEL/", type=PATH, required=True, help="The folder of train-lm.")
-@words_option(False, "The dictionary, if TOKENS are images.")
-@reading_options(" of images")
-@decoding_options("viterbi", "calibrated", "unknown", "explain")
+@click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=shared.PATH_OR_STREAM)
+@click.option("-m", "--model", metavar="MODEL/", type=shared.PATH, required=True, help="The folder of train-lm.")
+@shared.words_option(False, "The dictionary, if TOKENS are images.")
+@shared.reading_options(" of images")
+@shared.decoding_options
 @click.option("--viterbi", is_flag=True, help="Write the most probable path as best.")
 @click.option("--calibrated", is_flag=True, help="Apply what `placerec calibrate` found to the beliefs.")
 @click.option("--unknown", is_flag=True, help="Add a column: the probability that the place is none of the model's.")
 @click.option("--explain", is_flag=True, help="Write NAME.explain.jsonl beside the beliefs: what decided each word.")
 @click.option("--live", is_flag=True, help="Answer each frame as it comes: a camera, or a video at its own pace.")
 @click.option(
-    "--method",
-    metavar="NAME",
-    default="hohmm",
-    show_default=True,
-    help=f"What turns words into beliefs: hohmm, {', '.join(METHODS)}.",
+    "--method", metavar="NAME", default="hohmm", help=f"What turns words into beliefs: hohmm, {', '.join(METHODS)}."
 )
 @click.option(
-    "--scorer",
-    type=click.Choice(["native", "kenlm"]),
-    default="native",
-    show_default=True,
-    help="What computes the probabilities.",
+    "--scorer", type=click.Choice(["native", "kenlm"]), default="native", help="What computes the probabilities."
 )
-@json_option("Write one JSON object per frame instead of tab-separated lines.")
-@output_option(
+@shared.json_option("Write one JSON object per frame instead of tab-separated lines.")
+@shared.output_option(
     "beliefs/", "The folder to write: one file per sequence. Without it, one sequence goes to stdout.", False
 )
-@talk_options
+@shared.talk_options
 def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: Any) -> None:
     """Find the belief over places for every frame.
 
@@ -263,7 +232,7 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: 
     """
     from placerec.methods import check_method
 
-    with usage("--method"):
+    with shared.usage("--method"):
         check_method(how["method"], how["options"], scorer=how["scorer"])
     words = how["words"]
     if live:
@@ -307,7 +276,7 @@ def _decode_whole(tokens: tuple[Path | str, ...], out: Path | None, *, model: Pa
 
     if how["options"].explain and out is None:
         raise click.UsageError("--explain writes files beside the beliefs: it needs -o")
-    with progress_bar("describe") as progress:
+    with shared.progress_bar("describe") as progress:
         beliefs = run(tokens, model, out=out, progress=progress, **how)
     if out is None:
         click.echo(format_beliefs(beliefs[0], as_json=how["as_json"]), nl=False)
@@ -324,15 +293,15 @@ def _check_answering(what: str, out: Path | None, options: "Decoding") -> None:
 
 
 @click.command(epilog="Example: placerec evaluate beliefs/*.tsv --plot beliefs.png")
-@click.argument("beliefs", metavar="BELIEFS...", nargs=-1, required=True, type=PATH_OR_STREAM)
-@json_option()
+@click.argument("beliefs", metavar="BELIEFS...", nargs=-1, required=True, type=shared.PATH_OR_STREAM)
+@shared.json_option()
 @click.option(
     "--plot",
     metavar="FILE.png",
-    type=FILE,
+    type=shared.FILE,
     help="Draw beliefs against the truth, what was confused, and how far to trust them: .png, .svg or .pdf.",
 )
-@talk_options
+@shared.talk_options
 def evaluate(beliefs: tuple[Path, ...], as_json: bool, plot: Path | None) -> None:
     """Judge beliefs by the true places.
 

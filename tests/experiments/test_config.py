@@ -23,7 +23,7 @@ def test_all_of_a_config_is_read(tmp_path: Path) -> None:
     assert config.select == ("none", "compress:3", "unique")
     assert config.transition == ("fixed", "learned")
     assert (config.stay, config.per, config.units) == (0.9, "frame", "all")
-    assert (config.sequences, config.test, config.split) == ((), ("run3",), None)
+    assert (config.sequences, config.test, config.split) == ((), ("run3",), "")
 
 
 def test_defaults_are_the_papers(tmp_path: Path) -> None:

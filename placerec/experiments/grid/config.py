@@ -37,23 +37,16 @@ from placerec.model.options import MAX_ORDER
 from placerec.vision.dictionary import UNITS
 from placerec.words import parse_selection
 
-_TABLES = {
-    "data": ("sequences", "tokens", "test", "split"),
-    "grid": ("order", "smoothing", "select", "size", "transition", "seeds"),
-    "options": ("stay", "per", "units"),
-}
-_PLACEHOLDERS = ("size", "seed")
-
 
 @dataclass(frozen=True)
 class Config:
-    """An experiment; every name is that of the file. `sequences` or `tokens` is given, and `test` or `split`."""
+    """An experiment; every name is that of the file. Either `sequences` or `tokens` is empty, and `test` or `split`."""
 
     folder: Path  # what relative paths start from
     sequences: tuple[str, ...]
-    tokens: str | None
+    tokens: str
     test: tuple[str, ...]
-    split: str | None
+    split: str
     order: tuple[int, ...]
     smoothing: tuple[str, ...]
     select: tuple[str, ...]
@@ -66,107 +59,7 @@ class Config:
 
     def tokens_folder(self, size: int, seed: int) -> Path:
         """Where the token streams are that were made before for this size and seed."""
-        return self.folder / (self.tokens or "").format(size=size, seed=seed)
-
-
-def read_config(path: Path | str) -> Config:
-    """Read an experiment's file; ExperimentError names the file, the key, its value and the remedy."""
-    path = Path(path)
-    try:
-        content = tomllib.loads(read_text(path, ExperimentError))
-    except tomllib.TOMLDecodeError as error:
-        raise ExperimentError(f"{path}: is not TOML: {error}; mend that line") from error
-    return _Reader(path, content).config()
-
-
-@dataclass(frozen=True)
-class _Reader:
-    path: Path
-    content: Mapping[str, Any]
-
-    def config(self) -> Config:
-        self._check_keys()
-        data = self.content["data"]
-        self._one_of(data, "sequences", "tokens")
-        self._one_of(data, "test", "split")
-        size = self._list("grid", "size", _size)
-        seeds = self._value("grid", "seeds", _count, 5)
-        return Config(
-            folder=self.path.parent,
-            sequences=self._list("data", "sequences", _text) if "sequences" in data else (),
-            tokens=self._tokens(len(size), seeds) if "tokens" in data else None,
-            test=self._list("data", "test", _text) if "test" in data else (),
-            split=self._value("data", "split", _choice(*SPLITS), None) if "split" in data else None,
-            order=self._list("grid", "order", _order),
-            smoothing=self._list("grid", "smoothing", _choice(*SMOOTHINGS)),
-            select=self._list("grid", "select", _selection),
-            size=size,
-            transition=self._list("grid", "transition", _choice(*NAMED), ["fixed"]),
-            seeds=seeds,
-            stay=self._value("options", "stay", _share, STAY),
-            per=self._value("options", "per", _choice(*PER), "update"),
-            units=self._value("options", "units", _choice(*UNITS), "live"),
-        )
-
-    def _check_keys(self) -> None:
-        for table, content in self.content.items():
-            if table not in _TABLES:
-                raise self._error(f"unknown table [{table}]", f"there are [{'], ['.join(_TABLES)}]")
-            if not isinstance(content, dict):
-                raise self._error(f"{table} = {content!r} is no table", f"write [{table}] on a line of its own")
-            for key in content:
-                if key not in _TABLES[table]:
-                    raise self._error(f"unknown key {key!r} in [{table}]", f"there are {', '.join(_TABLES[table])}")
-        for table in ("data", "grid"):
-            if table not in self.content:
-                raise self._error(f"the table [{table}] is missing", f"it holds {', '.join(_TABLES[table])}")
-
-    def _one_of(self, data: Mapping[str, Any], first: str, second: str) -> None:
-        if first in data and second in data:
-            raise self._error(f"[data] has {first!r} and {second!r}, which exclude each other", "leave one out")
-        if first not in data and second not in data:
-            raise self._error(f"[data] has neither {first!r} nor {second!r}", "give one")
-
-    def _value(self, table: str, key: str, check: Callable[[Any], str], default: Any) -> Any:
-        value = self.content.get(table, {}).get(key, default)
-        if value is None:
-            raise self._error(f"[{table}] has no {key!r}", "add it")
-        return self._checked(f"[{table}] {key}", value, check)
-
-    def _list(self, table: str, key: str, check: Callable[[Any], str], default: Any = None) -> tuple[Any, ...]:
-        value = self._value(table, key, lambda value: "", default)
-        name = f"[{table}] {key}"
-        if not isinstance(value, list) or not value:
-            raise self._error(f"{name} = {value!r} is no list with something in it", f"write {key} = [...]")
-        for i, item in enumerate(value):
-            self._checked(name, item, check)
-            if item in value[:i]:
-                raise self._error(f"{name} lists {item!r} twice", "once is enough")
-        return tuple(value)
-
-    def _checked(self, name: str, value: Any, check: Callable[[Any], str]) -> Any:
-        remedy = check(value)
-        if remedy:
-            raise self._error(f"{name} = {value!r} cannot be used", remedy)
-        return value
-
-    def _tokens(self, sizes: int, seeds: int) -> str:
-        tokens: str = self._value("data", "tokens", _text, None)
-        remedy = "write the folder as in tokens/{size}-{seed}"
-        try:
-            found = [field for _, field, _, _ in Formatter().parse(tokens) if field is not None]
-        except ValueError as error:
-            raise self._error(f"[data] tokens = {tokens!r}: {error}", remedy) from error
-        for field in found:
-            if field not in _PLACEHOLDERS:
-                raise self._error(f"[data] tokens = {tokens!r} holds {{{field}}}", remedy)
-        for field, number in zip(_PLACEHOLDERS, (sizes, seeds), strict=True):
-            if number > 1 and field not in found:
-                raise self._error(f"[data] tokens = {tokens!r} is the same for every {field}", remedy)
-        return tokens
-
-    def _error(self, what: str, remedy: str) -> ExperimentError:
-        return ExperimentError(f"{self.path}: {what}; {remedy}")
+        return self.folder / self.tokens.format(size=size, seed=seed)
 
 
 def _choice(*names: str) -> Callable[[Any], str]:
@@ -176,11 +69,6 @@ def _choice(*names: str) -> Callable[[Any], str]:
 def _whole(least: int, most: int, remedy: str) -> Callable[[Any], str]:
     # Not isinstance: true and false are whole numbers, too.
     return lambda value: "" if type(value) is int and least <= value <= most else remedy
-
-
-_order = _whole(1, MAX_ORDER, f"give a whole number from 1 to {MAX_ORDER}")
-_size = _whole(2, 200, "give a whole number from 2 to 200, the side of the map")
-_count = _whole(1, 1000, "give how many there are, a whole number from 1; they are 0, 1, 2...")
 
 
 def _share(value: Any) -> str:
@@ -198,3 +86,110 @@ def _selection(value: Any) -> str:
     except PlacerecError as error:
         return str(error).partition("; ")[2]
     return "" if isinstance(value, str) else "give a text"
+
+
+@dataclass(frozen=True)
+class _Key:
+    """A key of a table: `check` gives the remedy for a value, or for one of a list, that cannot be used.
+
+    `default`: None where the key must be given.
+    """
+
+    check: Callable[[Any], str]
+    default: Any = None
+    many: bool = True
+
+
+_TABLES = {
+    "data": {
+        "sequences": _Key(_text, ()),
+        "tokens": _Key(_text, "", many=False),
+        "test": _Key(_text, ()),
+        "split": _Key(_choice(*SPLITS), "", many=False),
+    },
+    "grid": {
+        "order": _Key(_whole(1, MAX_ORDER, f"give a whole number from 1 to {MAX_ORDER}")),
+        "smoothing": _Key(_choice(*SMOOTHINGS)),
+        "select": _Key(_selection),
+        "size": _Key(_whole(2, 200, "give a whole number from 2 to 200, the side of the map")),
+        "transition": _Key(_choice(*NAMED), ("fixed",)),
+        "seeds": _Key(
+            _whole(1, 1000, "give how many there are, a whole number from 1; they are 0, 1, 2..."), 5, many=False
+        ),
+    },
+    "options": {
+        "stay": _Key(_share, STAY, many=False),
+        "per": _Key(_choice(*PER), "update", many=False),
+        "units": _Key(_choice(*UNITS), "live", many=False),
+    },
+}
+
+
+def read_config(path: Path | str) -> Config:
+    """Read an experiment's file; ExperimentError names the file, the key, its value and the remedy."""
+    path = Path(path)
+    text = read_text(path, ExperimentError)
+    try:
+        content = tomllib.loads(text)
+        _check_keys(content)
+        found = [(key, _value(content, table, key)) for table, keys in _TABLES.items() for key in keys]
+        config = Config(path.parent, **dict(found))
+        _check_tokens(config)
+    except tomllib.TOMLDecodeError as error:
+        raise ExperimentError(f"{path}: is not TOML: {error}; mend that line") from error
+    except ExperimentError as error:
+        raise ExperimentError(f"{path}: {error}") from error
+    return config
+
+
+def _check_keys(content: Mapping[str, Any]) -> None:
+    for table, given in content.items():
+        if table not in _TABLES:
+            raise ExperimentError(f"unknown table [{table}]; there are [{'], ['.join(_TABLES)}]")
+        if not isinstance(given, dict):
+            raise ExperimentError(f"{table} = {given!r} is no table; write [{table}] on a line of its own")
+        for key in given:
+            if key not in _TABLES[table]:
+                raise ExperimentError(f"unknown key {key!r} in [{table}]; there are {', '.join(_TABLES[table])}")
+    for table in ("data", "grid"):
+        if table not in content:
+            raise ExperimentError(f"the table [{table}] is missing; it holds {', '.join(_TABLES[table])}")
+    for first, second in (("sequences", "tokens"), ("test", "split")):
+        if first in content["data"] and second in content["data"]:
+            raise ExperimentError(f"[data] has {first!r} and {second!r}, which exclude each other; leave one out")
+        if first not in content["data"] and second not in content["data"]:
+            raise ExperimentError(f"[data] has neither {first!r} nor {second!r}; give one")
+
+
+def _value(content: Mapping[str, Any], table: str, key: str) -> Any:
+    rule, name = _TABLES[table][key], f"[{table}] {key}"
+    if key not in content.get(table, {}):
+        if rule.default is None:
+            raise ExperimentError(f"[{table}] has no {key!r}; add it")
+        return rule.default
+    value = content[table][key]
+    if rule.many and (not isinstance(value, list) or not value):
+        raise ExperimentError(f"{name} = {value!r} is no list with something in it; write {key} = [...]")
+    items = value if rule.many else [value]
+    for i, item in enumerate(items):
+        if remedy := rule.check(item):
+            raise ExperimentError(f"{name} = {item!r} cannot be used; {remedy}")
+        if item in items[:i]:
+            raise ExperimentError(f"{name} lists {item!r} twice; once is enough")
+    return tuple(value) if rule.many else value
+
+
+def _check_tokens(config: Config) -> None:
+    """Whether the folder of the token streams is another one for every size and seed."""
+    name, remedy = f"[data] tokens = {config.tokens!r}", "write the folder as in tokens/{size}-{seed}"
+    try:
+        found = [field for _, field, _, _ in Formatter().parse(config.tokens) if field is not None]
+    except ValueError as error:
+        raise ExperimentError(f"{name}: {error}; {remedy}") from error
+    numbers = {"size": len(config.size), "seed": config.seeds}
+    for field in found:
+        if field not in numbers:
+            raise ExperimentError(f"{name} holds {{{field}}}; {remedy}")
+    for field, number in numbers.items():
+        if config.tokens and number > 1 and field not in found:
+            raise ExperimentError(f"{name} is the same for every {field}; {remedy}")

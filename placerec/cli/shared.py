@@ -8,7 +8,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -129,12 +129,6 @@ def source_arguments(function: Command) -> Command:
     return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH_OR_STREAM)(function)
 
 
-def jobs_option(function: Command) -> Command:
-    """--jobs: how many processes."""
-    text = "Processes that share the work; the output is the same for any number.  [default: one a processor]"
-    return click.option("-j", "--jobs", metavar="N", type=click.IntRange(min=1), help=text)(function)
-
-
 def _cluster_address(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     if value is not None:
         from placerec.cluster import check_address
@@ -144,6 +138,14 @@ def _cluster_address(ctx: click.Context, param: click.Parameter, value: str | No
     return value
 
 
+tokens_argument = click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH)
+jobs_option = click.option(
+    "-j",
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Processes that share the work; the output is the same for any number.  [default: one a processor]",
+)
 _CLUSTER = click.option(
     "--cluster",
     metavar="ADDRESS|local:N",
@@ -152,15 +154,12 @@ _CLUSTER = click.option(
 )
 
 
-@contextmanager
-def _cluster(address: str | None) -> Iterator["Executor | None"]:
+def _cluster(address: str | None) -> "AbstractContextManager[Executor | None]":
     if address is None:
-        yield None
-        return
+        return nullcontext()
     from placerec.cluster import cluster
 
-    with cluster(address) as work:
-        yield work
+    return cluster(address)
 
 
 def cluster_option(function: Command) -> Command:
@@ -201,16 +200,10 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
             "format_",
             type=click.Choice(["auto", "sequences", "places"]),
             default="auto",
-            show_default=True,
             help=f"What a folder of folders{note} is: sequences, or one folder per place.",
         )
         @click.option(
-            "--every",
-            metavar="N",
-            type=click.IntRange(min=1),
-            default=1,
-            show_default=True,
-            help="Read the first of every N frames.",
+            "--every", metavar="N", type=click.IntRange(min=1), default=1, help="Read the first of every N frames."
         )
         @click.option("--topic", metavar="NAME", help="The images of a bag to read, if it has several topics of them.")
         @click.option(
@@ -266,7 +259,6 @@ def descriptor_options(function: Command) -> Command:
         "--variant",
         type=click.Choice(["lmgist", "classic"]),
         default="lmgist",
-        show_default=True,
         help="Which GIST: LMgist (2011), or that of 2006 and lear_gist.",
     )
     @click.option(
@@ -274,14 +266,12 @@ def descriptor_options(function: Command) -> Command:
         # Above 1024 the filters alone take gigabytes, and the descriptor has no use for the detail.
         type=click.IntRange(8, 1024),
         default=128,
-        show_default=True,
         help="Side of the square that is described, in pixels.",
     )
     @click.option(
         "--fit",
         type=click.Choice(["squash", "crop"]),
         default="squash",
-        show_default=True,
         help="How a picture becomes a square: stretched, or its middle.",
     )
     @functools.wraps(function)
@@ -317,17 +307,12 @@ def matrix_option(function: Command) -> Command:
 def size_option(default: int) -> Callable[[Command], Command]:
     """--size: of the map."""
     text = "Side of the map: size x size words."
-    return click.option("--size", type=click.IntRange(2, 200), default=default, show_default=True, help=text)
+    return click.option("--size", type=click.IntRange(2, 200), default=default, help=text)
 
 
 def seed_option(text: str) -> Callable[[Command], Command]:
     """--seed: 0 or above, 0 by default."""
-    return click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help=text)
-
-
-def tokens_argument(function: Command) -> Command:
-    """TOKENS...: files and folders of words."""
-    return click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH)(function)
+    return click.option("--seed", type=click.IntRange(min=0), default=0, help=text)
 
 
 def words_option(required: bool, text: str) -> Callable[[Command], Command]:
@@ -351,53 +336,46 @@ def echo_json(found: object) -> None:
     click.echo(json.dumps(found, indent=2, ensure_ascii=False))
 
 
-_DECODING = (
-    click.option(
+def decoding_options(function: Command) -> Command:
+    """What beliefs depend on: --transition, --stay, --per, --max-gap, --smooth, --lag. The command gets `options`.
+
+    Other options of the command that are fields of `Decoding` become part of it, too.
+    """
+
+    @click.option(
         "--transition",
         metavar="fixed|learned|FILE",
         default="fixed",
-        show_default=True,
         help="How the place changes: --stay, as the training counted it, or a table of probabilities.",
-    ),
-    click.option(
+    )
+    @click.option(
         "--stay", type=FiniteRange(0, 1), help="Probability of staying in a place for one step.  [default: 0.99]"
-    ),
-    click.option(
+    )
+    @click.option(
         "--per",
         type=click.Choice(["update", "frame", "second"]),
         help="What one step is: a selected word, a frame, a second.  [default: update]",
-    ),
-    click.option(
+    )
+    @click.option(
         "--max-gap",
         metavar="SECONDS",
         type=FiniteRange(0, min_open=True),
         help="More time than this between two frames begins a new sequence.",
-    ),
-    click.option("--smooth", is_flag=True, help="Let all words of a sequence count for every frame."),
-    click.option(
+    )
+    @click.option("--smooth", is_flag=True, help="Let all words of a sequence count for every frame.")
+    @click.option(
         "--lag", metavar="N", type=click.IntRange(0), help="Let the words up to N frames later count for each frame."
-    ),
-)
-_DECODING_NAMES = ("transition", "stay", "per", "max_gap", "smooth", "lag")
+    )
+    @functools.wraps(function)
+    def decoding(*args: Any, **options: Any) -> Any:
+        from dataclasses import fields
 
+        from placerec.model import Decoding
 
-def decoding_options(*more: str) -> Callable[[Command], Command]:
-    """What beliefs depend on: --transition, --stay, --per, --max-gap, --smooth, --lag. The command gets `options`.
+        try:
+            chosen = Decoding(**{one.name: options.pop(one.name) for one in fields(Decoding) if one.name in options})
+        except PlacerecError as error:
+            raise click.UsageError(str(error)) from error
+        return function(*args, options=chosen, **options)
 
-    `more`: flags of the command's own that are fields of `Decoding`, too.
-    """
-
-    def decorated(function: Command) -> Command:
-        @functools.wraps(function)
-        def decoding(*args: Any, **options: Any) -> Any:
-            from placerec.model import Decoding
-
-            try:
-                chosen = Decoding(**{name: options.pop(name) for name in (*_DECODING_NAMES, *more)})
-            except PlacerecError as error:
-                raise click.UsageError(str(error)) from error
-            return function(*args, options=chosen, **options)
-
-        return functools.reduce(lambda command, option: option(command), reversed(_DECODING), decoding)
-
-    return decorated
+    return decoding
