@@ -76,7 +76,8 @@ def _quiet() -> Iterator[Any]:
     check_optional("distributed", "--cluster")
     import distributed
 
-    loggers = [logging.getLogger(name) for name in {*_TALKERS, *logging.root.manager.loggerDict} if _talks(name)]
+    names = {*_TALKERS, *logging.root.manager.loggerDict}
+    loggers = [logging.getLogger(name) for name in names if name.partition(".")[0] in _TALKERS]
     levels = [(logger, logger.level) for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)
@@ -89,10 +90,6 @@ def _quiet() -> Iterator[Any]:
     finally:
         for logger, level in levels:
             logger.setLevel(level)
-
-
-def _talks(name: str) -> bool:
-    return name.partition(".")[0] in _TALKERS
 
 
 @contextmanager

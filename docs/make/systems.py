@@ -20,8 +20,14 @@ import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
 from placerec.experiments.comparison.benchmark import COMPARED, FrontEndCost, MethodRun
-from placerec.experiments.comparison.figure import plot_comparison
-from placerec.experiments.comparison.results import Comparison, MethodScore, format_methods, format_pairs, judge
+from placerec.experiments.comparison.results import (
+    Comparison,
+    MethodScore,
+    format_methods,
+    format_pairs,
+    judge,
+    plot_comparison,
+)
 from placerec.experiments.comparison.run import SIZE, compare
 from placerec.files import write_text
 from placerec.frames import find_sequences

@@ -43,26 +43,24 @@ _KINDS = ((b"\x89PNG\r\n\x1a\n", "image/png"), (b"\xff\xd8\xff", "image/jpeg"))
 
 def html_page(title: str, body: Iterable[str]) -> str:
     """A whole page: `title` as text, `body` as pieces of HTML from the functions below."""
-    name = html.escape(title)
-    return "\n".join(
-        [
-            "<!doctype html>",
-            '<html lang="en">',
-            "<head>",
-            '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{name}</title>",
-            f"<style>\n{_STYLE}\n</style>",
-            "</head>",
-            "<body>",
-            f"<h1>{name}</h1>",
-            *body,
-            "</body>",
-            "</html>",
-            "",
-        ]
-    )
+    name, pieces = html.escape(title), "\n".join(body)
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{name}</title>
+<style>
+{_STYLE}
+</style>
+</head>
+<body>
+<h1>{name}</h1>
+{pieces}
+</body>
+</html>
+"""
 
 
 def heading(text: str, level: int = 2) -> str:

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from placerec.experiments.comparison.benchmark import FrontEndCost
-from placerec.experiments.comparison.figure import plot_comparison, spread
-from placerec.experiments.comparison.results import Comparison, MethodScore
+from placerec.experiments.comparison.results import Comparison, MethodScore, plot_comparison, spread
 
 pytest.importorskip("matplotlib")
 

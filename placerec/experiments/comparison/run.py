@@ -16,8 +16,7 @@ from pathlib import Path
 from placerec.errors import EvaluationError, SourceError, check_optional
 from placerec.evaluation.bootstrap import LEAST
 from placerec.experiments.comparison.benchmark import COMPARED, TWO_WORDS, Benchmark, MethodRun, encode, train_models
-from placerec.experiments.comparison.figure import plot_comparison
-from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
+from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge, plot_comparison
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
 from placerec.figures.canvas import check_figure
 from placerec.files import whole_folder, write_text

@@ -120,12 +120,22 @@ def _computed(job: CellJob, cells: Sequence[GridCell]) -> dict[str, Any]:
 
 def _believed(job: CellJob, streams: _Streams, cells: Sequence[GridCell]) -> Iterator[tuple[GridCell, list[Beliefs]]]:
     """The cells and their beliefs; models are made once for all transitions."""
+    places, listed = tuple(streams.corpus.sentences), frozenset(streams.corpus.vocabulary)
     selection = parse_selection(job.select)
+
+    def filtered(stream: WordStream, union: Emissions, way: Transition) -> Beliefs:
+        evidence = next(evidence_in(stream, union, listed, selection=selection, per=way.per, max_gap=None))
+        belief, _ = posterior(evidence, way)
+        return Beliefs.of(stream, places, belief, selected=evidence.selected)
+
     for (smoothing, order), same in groupby(sorted(cells), lambda cell: cell[:2]):
         union = _models(streams.counts, smoothing, order)
         for cell in same:
-            transition = _transition(cell.transition, streams, job)
-            yield cell, [_filtered(test, union, streams.corpus, selection, transition) for test in streams.tests]
+            if cell.transition == "fixed":
+                way = fixed_transition(len(places), job.stay, job.per)
+            else:
+                way = learned_transition(np.sum([place_steps(one, places) for one in streams.training], axis=0))
+            yield cell, [filtered(test, union, way) for test in streams.tests]
 
 
 def _counts(corpus: Corpus, order: int) -> list[NgramCounts]:
@@ -142,23 +152,6 @@ def up_to(counts: NgramCounts, order: int) -> NgramCounts:
     """The counts of the orders up to `order` alone."""
     keys = counts.trie.keys[:order]
     return NgramCounts(Trie(counts.trie.vocabulary, keys), counts.counts[:order], counts.seen[:order])
-
-
-def _transition(name: str, streams: _Streams, job: CellJob) -> Transition:
-    places = list(streams.corpus.sentences)
-    if name == "fixed":
-        return fixed_transition(len(places), job.stay, job.per)
-    return learned_transition(np.sum([place_steps(stream, places) for stream in streams.training], axis=0))
-
-
-def _filtered(
-    stream: WordStream, union: Emissions, corpus: Corpus, selection: Selection, transition: Transition
-) -> Beliefs:
-    listed = frozenset(corpus.vocabulary)
-    parts = evidence_in(stream, union, listed, selection=selection, per=transition.per, max_gap=None)
-    evidence = next(parts)
-    belief, _ = posterior(evidence, transition)
-    return Beliefs.of(stream, tuple(corpus.sentences), belief, selected=evidence.selected)
 
 
 def _frame_wise(streams: _Streams, smoothing: str) -> dict[str, int]:

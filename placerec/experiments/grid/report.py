@@ -17,7 +17,7 @@ from placerec.experiments.grid.cells import GridCell, GridJob, believe_cell
 from placerec.experiments.grid.claims import HIGH, Claim, Statement, judge
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
-from placerec.experiments.grid.results import FoldData, Results, Row, Setting, by_seed
+from placerec.experiments.grid.results import Results, Row, Setting, by_seed
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
@@ -33,14 +33,14 @@ _PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib")
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
 
-def images_table(folds: Mapping[str, FoldData]) -> Table:
+def images_table(folds: Mapping[str, Mapping[str, Mapping[str, int]]]) -> Table:
     """Labelled images per place and split (the paper's Table 2)."""
-    places = sorted({place for fold in folds.values() for place in (*fold.train, *fold.test)})
+    places = sorted({place for fold in folds.values() for images in fold.values() for place in images})
     lines = []
     for name, fold in folds.items():
-        for split, images in (("training", fold.train), ("testing", fold.test)):
+        for split, images in fold.items():
             counts = [images.get(place, 0) for place in places]
-            lines.append((name, split, *map(str, counts), str(sum(counts))))
+            lines.append((name, f"{split}ing", *map(str, counts), str(sum(counts))))
     return ("fold", "split", *places, "all"), lines
 
 
@@ -214,7 +214,7 @@ def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
 
 
 def _what(results: Results, plan: Config, config: Path) -> str:
-    frames = {name: sum(fold.test.values()) for name, fold in results.folds.items()}
+    frames = {name: sum(fold["test"].values()) for name, fold in results.folds.items()}
     source = f"the token streams {plan.tokens}" if plan.tokens else f"the images of {', '.join(plan.sequences)}"
     split = plan.split or f"tests are {', '.join(plan.test)}"
     return (

@@ -90,19 +90,11 @@ class Setting(NamedTuple):
 
 
 @dataclass(frozen=True)
-class FoldData:
-    """What the recordings of a fold hold: labelled images per place."""
-
-    train: Mapping[str, int]
-    test: Mapping[str, int]
-
-
-@dataclass(frozen=True)
 class Results:
-    """All rows, in the order of results.csv, and the folds by name."""
+    """All rows, in the order of results.csv, and by fold and split (train, test) the labelled images per place."""
 
     rows: Sequence[Row] = field(repr=False)
-    folds: Mapping[str, FoldData] = field(repr=False)
+    folds: Mapping[str, Mapping[str, Mapping[str, int]]] = field(repr=False)
 
 
 def by_seed(

@@ -13,7 +13,7 @@ from placerec.errors import ExperimentError
 from placerec.experiments.grid.cells import KEPT, CellJob, GridCell, GridJob, run_cells
 from placerec.experiments.grid.config import Config, read_config
 from placerec.experiments.grid.report import write_reports
-from placerec.experiments.grid.results import COLUMNS, FoldData, Results, Row, SequenceCount, write_results
+from placerec.experiments.grid.results import COLUMNS, Results, Row, SequenceCount, write_results
 from placerec.experiments.grid.splits import SPLITS, Fold, named_tests
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, make_tokens
 from placerec.figures.canvas import check_figure
@@ -124,9 +124,9 @@ def find_images(globs: Sequence[str], folder: Path) -> list[FrameSequence]:
 def collect(jobs: Sequence[GridJob], found: Sequence[Mapping[str, Any]]) -> Results:
     """The rows of all cells, sorted, and what the folds hold."""
     rows: list[Row] = []
-    folds: dict[str, FoldData] = {}
+    folds = {}
     for job, results in zip(jobs, found, strict=True):
-        folds[job.fold.name] = FoldData(results["data"]["train"], results["data"]["test"])
+        folds[job.fold.name] = {split: results["data"][split] for split in ("train", "test")}
         rows += [_row(job, cell, results) for cell in job.work.cells]
     return Results(sorted(rows, key=attrgetter(*COLUMNS[:7])), folds)
 
