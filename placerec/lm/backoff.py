@@ -10,7 +10,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import LanguageModelError, refuse_string
 from placerec.lm.score import Contexts, Ngrams, ScoreTables, build_tables
-from placerec.lm.trie import Trie, runs
+from placerec.lm.trie import Trie, distinct
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN, Vocabulary
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def _united(tries: Sequence[Trie]) -> Trie:
             row[trie.prefix(n)] * len(vocabulary) + word[trie.word(n)] if n <= trie.order else np.zeros(0, np.int64)
             for trie, word, row in zip(tries, words, rows, strict=True)
         ]
-        keys.append(runs(np.sort(np.concatenate(wanted)))[0])
+        keys.append(distinct(wanted))
         rows = [np.searchsorted(keys[-1], key) for key in wanted]
     return Trie(vocabulary, tuple(keys))
 

@@ -216,12 +216,7 @@ def weigh_contexts(model: MutableModel, n: int, trace: Trace, *, minimum: float 
         return
     contexts = np.flatnonzero(model.is_context[n - 2])
     group = np.searchsorted(contexts, model.trie.prefix(n)[rows])
-    num, den = context_masses(model, n, contexts, rows, group)
-    if minimum is not None:
-        num = _keep_minimum(model, n, rows, group, contexts, num, minimum, trace)
-    num[np.abs(num) < EPSILON] = 0
-    den[np.abs(den) < EPSILON] = 0
-    num, den, overfull = settle_masses(model, n, rows, group, contexts, num, den, trace)
+    num, den, overfull = settle_masses(model, n, rows, group, contexts, minimum, trace)
     with np.errstate(divide="ignore", invalid="ignore"):
         weight = np.where((num < EPSILON) & (den < EPSILON), 0, np.log10(num) - np.log10(den)).astype(np.float32)
     weight[overfull] = -np.inf
@@ -229,47 +224,36 @@ def weigh_contexts(model: MutableModel, n: int, trace: Trace, *, minimum: float 
     trace.weights(n, contexts, num, den, weight)
 
 
-def context_masses(model: MutableModel, n: int, contexts: Ints, rows: Ints, group: Ints) -> tuple[Floats, Floats]:
-    """What the n-grams `rows` leave, per context: 1 - sum p, and 1 - sum p by the shorter context, float64 (C,)."""
+def settle_masses(
+    model: MutableModel, n: int, rows: Ints, group: Ints, contexts: Ints, minimum: float | None, trace: Trace
+) -> tuple[Floats, Floats, Mask]:
+    """Steps 1 to 4 of section 6.5: what `rows`, n-grams of the contexts `contexts[group]`, leave to backing off.
+
+    Per context 1 - sum p, and 1 - sum p by the shorter context, float64 (C,), and which sums are above 1, bool (C,).
+    Contexts that have seen every word, and those that leave less than `minimum`, are scaled.
+    """
     shorter = model.backed_off(n - 1)[model.trie.suffixes[n - 1][rows]]
     num = 1 - per_context(group, len(contexts), p_of(model.log10_p[n - 1][rows]))
     den = 1 - per_context(group, len(contexts), p_of(shorter))
-    return num, den
-
-
-def settle_masses(
-    model: MutableModel, n: int, rows: Ints, group: Ints, contexts: Ints, num: Floats, den: Floats, trace: Trace
-) -> tuple[Floats, Floats, Mask]:
-    """Steps 2 to 4 of section 6.5: contexts that have seen every word are scaled, and what cannot be is reported."""
+    if minimum is not None and (scarce := minimum - num > EPSILON).any():
+        trace.scarce_contexts(n, contexts[scarce], num[scarce], minimum)
+        scale = np.where(scarce, np.log10(1 - minimum) - np.log10(1 - np.where(scarce, num, 0)), 0).astype(np.float32)
+        model.log10_p[n - 1][rows] += scale[group]
+        num[scarce] = minimum
+    num[np.abs(num) < EPSILON] = 0
+    den[np.abs(den) < EPSILON] = 0
     stuck = (den < EPSILON) & (num > EPSILON)
     if stuck.any():
         trace.full_contexts(n, contexts[stuck])
         scale = np.where(stuck, -np.log10(1 - np.where(stuck, num, 0)), 0).astype(np.float32)
         model.log10_p[n - 1][rows] += scale[group]
-    num, den = np.where(stuck, 0, num), np.where(stuck, 0, den)
+    num[stuck] = den[stuck] = 0
     overfull = num < 0
     if overfull.any():
         trace.overfull_contexts(n, contexts[overfull], num[overfull])
     nothing = ~overfull & (den <= 0)
-    return np.where(nothing, 0, num), np.where(nothing, 0, den), overfull
-
-
-def _keep_minimum(
-    model: MutableModel,
-    n: int,
-    rows: Ints,
-    group: Ints,
-    contexts: Ints,
-    num: Floats,
-    minimum: float,
-    trace: Trace,
-) -> Floats:
-    scarce = minimum - num > EPSILON
-    if scarce.any():
-        trace.scarce_contexts(n, contexts[scarce], num[scarce], minimum)
-        scale = np.where(scarce, np.log10(1 - minimum) - np.log10(1 - np.where(scarce, num, 0)), 0).astype(np.float32)
-        model.log10_p[n - 1][rows] += scale[group]
-    return np.where(scarce, minimum, num)
+    num[nothing] = den[nothing] = 0
+    return num, den, overfull
 
 
 def spread_unigram_mass(model: MutableModel, mass: float, trace: Trace) -> None:

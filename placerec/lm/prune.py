@@ -5,9 +5,9 @@ Sections 11.2 and 11.3 of our SRILM specification.
 
 import numpy as np
 
-from placerec.arrays import Floats, Ints, Singles
-from placerec.lm.logs import EPSILON, LN10, p_of
-from placerec.lm.mutable import SILENT, MutableModel, Trace, context_masses, insert_prefixes, reweigh, settle_masses
+from placerec.arrays import Ints, Singles
+from placerec.lm.logs import LN10, p_of
+from placerec.lm.mutable import SILENT, MutableModel, Trace, insert_prefixes, reweigh, settle_masses
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 
 
@@ -33,31 +33,9 @@ def _prune_order(model: MutableModel, n: int, threshold: float, history: Mutable
     contexts = np.flatnonzero(model.is_context[n - 2])
     rows = np.flatnonzero(model.stored[n - 1])
     group = np.searchsorted(contexts, model.trie.prefix(n)[rows])
-    num, den = context_masses(model, n, contexts, rows, group)
-    num[np.abs(num) < EPSILON] = 0
-    den[np.abs(den) < EPSILON] = 0
-    num, den, overfull = settle_masses(model, n, rows, group, contexts, num, den, trace)
+    num, den, overfull = settle_masses(model, n, rows, group, contexts, None, trace)
     tried = ~overfull[group]
-    gone = _try(model, n, threshold, history, rows[tried], contexts, group[tried], num, den, trace)
-    model.stored[n - 1][gone] = False
-    _forget_contexts(model, n, contexts[~overfull])
-    model.refresh(n)
-    trace.pruned(n, gone)
-
-
-def _try(
-    model: MutableModel,
-    n: int,
-    threshold: float,
-    history: MutableModel,
-    rows: Ints,
-    contexts: Ints,
-    group: Ints,
-    num: Floats,
-    den: Floats,
-    trace: Trace,
-) -> Ints:
-    """Which of `rows`, n-grams of the contexts `contexts[group]`, can go."""
+    rows, group = rows[tried], group[tried]
     vocabulary = model.trie.vocabulary.index
     start, end = vocabulary.get(SENTENCE_START, -1), vocabulary.get(SENTENCE_END, -1)
     context = joint_log10_p(history, n - 1, start=start, end=end)[contexts][group]
@@ -71,7 +49,10 @@ def _try(
         entropy = -p_of(context) * (p_of(old) * change + left)
         gone = (np.exp(entropy * LN10) - 1 < threshold) & ~model.is_context[n - 1][rows]
     trace.trials(n, rows, context, old, new, entropy, gone)
-    return rows[gone]
+    model.stored[n - 1][rows[gone]] = False
+    _forget_contexts(model, n, contexts[~overfull])
+    model.refresh(n)
+    trace.pruned(n, rows[gone])
 
 
 def joint_log10_p(model: MutableModel, n: int, *, start: int, end: int) -> Singles:

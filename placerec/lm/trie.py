@@ -134,6 +134,11 @@ def runs(values: Ints) -> tuple[Ints, Ints]:
     return values[new], np.cumsum(new) - 1
 
 
+def distinct(keys: Sequence[Ints]) -> Ints:
+    """The distinct numbers of all `keys`, ascending, int64 (m,)."""
+    return runs(np.sort(np.concatenate([np.zeros(0, np.int64), *keys])))[0]
+
+
 def per_context(prefix: Ints, size: int, values: NDArray[Any] | None = None) -> Floats:
     """Sums float64 (size,) of `values` (default: ones) over the rows that share a prefix row."""
     return np.bincount(prefix, weights=values, minlength=size).astype(np.float64)
@@ -149,9 +154,15 @@ def build_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tu
     for n in range(2, order + 1):
         wide = [i for i, matrix in enumerate(ngrams) if matrix.shape[1] >= n]
         wanted = [rows[i][-1] * len(vocabulary) + ngrams[i][:, n - 1] for i in wide]
-        keys.append(np.unique(np.concatenate(wanted)) if wide else np.zeros(0, np.int64))
-        for i, key in zip(wide, wanted, strict=True):
-            rows[i].append(np.searchsorted(keys[-1], key))
+        # Mostly every prefix is an n-gram of its own: then there is less to sort.
+        listed = distinct([key for i, key in zip(wide, wanted, strict=True) if ngrams[i].shape[1] == n])
+        found = list(map(RowIndex(listed).find, wanted))
+        if any((row < 0).any() for row in found):
+            listed = distinct(wanted)
+            found = [np.searchsorted(listed, key) for key in wanted]
+        keys.append(listed)
+        for i, row in zip(wide, found, strict=True):
+            rows[i].append(row)
     return Trie(vocabulary, tuple(keys)), rows
 
 
@@ -165,25 +176,7 @@ def closed_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> t
 
     Also the rows int64 (m,) of every group's n-grams' prefixes: of length 1, 2, ..., n.
     """
-    trie, rows = _complete_trie(vocabulary, order, ngrams) or build_trie(vocabulary, order, ngrams)
+    trie, rows = build_trie(vocabulary, order, ngrams)
     if not trie.closed:
         trie, rows = build_trie(vocabulary, order, [*ngrams, *(end for group in ngrams for end in endings(group))])
     return trie, rows[: len(ngrams)]
-
-
-def _complete_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tuple[Trie, list[list[Ints]]] | None:
-    """The trie of n-grams and the rows of their prefixes, if every prefix is an n-gram of its own; else None."""
-    keys = [np.arange(len(vocabulary))]
-    rows = [[matrix[:, 0]] for matrix in ngrams]
-    for n in range(2, order + 1):
-        wide = [i for i, matrix in enumerate(ngrams) if matrix.shape[1] >= n]
-        wanted = [rows[i][-1] * len(vocabulary) + ngrams[i][:, n - 1] for i in wide]
-        own = [key for i, key in zip(wide, wanted, strict=True) if ngrams[i].shape[1] == n]
-        listed = runs(np.sort(np.concatenate(own)))[0] if own else np.zeros(0, np.int64)
-        index = RowIndex(listed)
-        keys.append(listed)
-        for i, key in zip(wide, wanted, strict=True):
-            rows[i].append(index.find(key))
-            if (rows[i][-1] < 0).any():
-                return None
-    return Trie(vocabulary, tuple(keys)), rows
