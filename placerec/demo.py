@@ -166,7 +166,12 @@ def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, c
             "Witten-Bell, n = 2, on the six synthetic test sequences.",
         ),
         heading("Everything between is text"),
-        *_texts(folder, "KT-B"),
+        paragraph("A token stream, one word per frame (tokens/seq4_cloudy3.tsv):"),
+        preformatted(_head(folder / "tokens/seq4_cloudy3.tsv", 8)),
+        paragraph("The visits to the kitchen, one a line (models/witten-bell-2/sentences/KT-B.txt):"),
+        preformatted(_head(folder / "models/witten-bell-2/sentences/KT-B.txt", 3)),
+        paragraph("Its language model, models/witten-bell-2/KT-B.arpa, as “placerec inspect” reads it:"),
+        preformatted(_inspected(folder / "models/witten-bell-2", "KT-B")),
         heading("Do it again"),
         preformatted(commands),
     ]
@@ -187,18 +192,6 @@ def _results_table(results: DemoResults) -> str:
         rows,
         f"{majority.frames} synthetic test frames, the third run of each path and light; runs 1 and 2 trained.",
     )
-
-
-def _texts(folder: Path, place: str) -> list[str]:
-    model = folder / "models/witten-bell-2"
-    return [
-        paragraph("A token stream, one word per frame (tokens/seq4_cloudy3.tsv):"),
-        preformatted(_head(folder / "tokens/seq4_cloudy3.tsv", 8)),
-        paragraph(f"The visits to the kitchen, one a line (models/witten-bell-2/sentences/{place}.txt):"),
-        preformatted(_head(model / f"sentences/{place}.txt", 3)),
-        paragraph(f"Its language model, models/witten-bell-2/{place}.arpa, as “placerec inspect” reads it:"),
-        preformatted(_inspected(model, place)),
-    ]
 
 
 def _head(path: Path, lines: int) -> str:

@@ -86,7 +86,7 @@ def compared(folder: Path, test: Sequence[str], size: int, work: Path) -> Compar
         runs = together(parts, seed)
         found.append(judge(runs, parts[0][1].cost, seed))
         rights.append({name: count_blocks(run.beliefs)[1] for name, run in runs.items()})
-        frames = count_blocks(runs[HOHMM].beliefs)[0].frames
+        frames = count_blocks(runs[HOHMM].beliefs)[0]
         sys.stderr.write(f"{folder.name}: map {seed + 1} of {len(SEEDS)}\n")
     return mean_of(found, rights, frames)
 

@@ -9,9 +9,7 @@ from typing import Any
 
 import click
 
-from placerec.cli.experiments import compare, demo, experiment, lab
-from placerec.cli.images import describe, show_frame, show_words, stability, tokenize, train_words
-from placerec.cli.models import calibrate, check, decode, evaluate, inspect, train_lm, update
+from placerec.cli import experiments, images, models
 from placerec.cli.srilm import SRILM_COMMANDS
 from placerec.errors import PlacerecError
 from placerec.version import __version__
@@ -65,27 +63,9 @@ def commands() -> None:
     """Which place is the camera in? Images become words, places become language models."""
 
 
-for command in (
-    describe,
-    train_words,
-    tokenize,
-    train_lm,
-    update,
-    decode,
-    evaluate,
-    calibrate,
-    compare,
-    inspect,
-    check,
-    lab,
-    experiment,
-    demo,
-    show_words,
-    show_frame,
-    stability,
-    *SRILM_COMMANDS,
-):
-    commands.add_command(command)
+for command in (*vars(images).values(), *vars(models).values(), *vars(experiments).values(), *SRILM_COMMANDS):
+    if isinstance(command, click.Command):
+        commands.add_command(command)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

@@ -230,7 +230,7 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: 
     and answers each at once. With -w and --live, TOKENS is a camera (camera:0, camera:/dev/video2,
     camera:rtsp://...) or a video; frames that come too fast are dropped, and Ctrl-C ends it.
     """
-    from placerec.methods import check_method
+    from placerec.methods import check_method, decode_live
 
     with shared.usage("--method"):
         check_method(how["method"], how["options"], scorer=how["scorer"])
@@ -239,7 +239,9 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: 
         if words is None or len(tokens) > 1 or _STDIN in tokens:
             raise click.UsageError("--live takes one camera or video, and needs -w to see it")
         _check_answering("--live", out, how["options"])
-        _answer_frames(tokens[0], **how)
+        with closing(decode_live(tokens[0], **how)) as answers:
+            for line in answers:
+                click.echo(line)
     elif tokens == (_STDIN,) and words is None:
         _check_answering("`-`", out, how["options"])
         _answer_lines(**how)
@@ -247,15 +249,6 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: 
         raise click.UsageError("`-` cannot be mixed with files")
     else:
         _decode_whole(tokens, out, **how)
-
-
-def _answer_frames(source: Path | str, model: Path, **how: Any) -> None:
-    """An answer for each frame of a camera or a video, as it comes."""
-    from placerec.methods import decode_live
-
-    with closing(decode_live(source, model, **how)) as answers:
-        for line in answers:
-            click.echo(line)
 
 
 def _answer_lines(*, model: Path, method: str, options: "Decoding", scorer: str, as_json: bool, **_: Any) -> None:

@@ -25,14 +25,6 @@ LEAST = 6
 
 
 @dataclass(frozen=True)
-class Blocks:
-    """What is drawn: U sequences, or the visits of a single one. `frames` int64 (U,): labelled ones, all above 0."""
-
-    frames: Ints
-    what: str  # "sequences" or "visits"
-
-
-@dataclass(frozen=True)
 class Pair:
     """Whether the accuracies of two methods differ: first - second, and its interval over so many `blocks`."""
 
@@ -49,10 +41,10 @@ class Pair:
         return self.blocks >= LEAST and (self.low > 0 or self.high < 0)
 
 
-def count_blocks(beliefs: Sequence[Beliefs]) -> tuple[Blocks, Floats]:
-    """The blocks of one method's beliefs, and how many of the frames of each are right, float64 (U,).
+def count_blocks(beliefs: Sequence[Beliefs]) -> tuple[Ints, Floats, str]:
+    """The U blocks that are drawn: their labelled frames, all above 0, int64 (U,); the right ones, float64 (U,); what.
 
-    Sequences with a label; where there is one only, its visits (runs of a label). Raises EvaluationError without any.
+    Blocks are "sequences" with a label, or "visits" (runs of a label) of a single one. EvaluationError without any.
     """
     counted = [_labelled(sequence) for sequence in beliefs]
     counted = [(truth, right) for truth, right in counted if len(truth)]
@@ -64,7 +56,7 @@ def count_blocks(beliefs: Sequence[Beliefs]) -> tuple[Blocks, Floats]:
         ends = np.flatnonzero(truth[1:] != truth[:-1]) + 1
         counted = list(zip(np.split(truth, ends), np.split(right, ends), strict=True))
     frames = np.array([len(truth) for truth, _ in counted], np.int64)
-    return Blocks(frames, what), np.array([right.sum() for _, right in counted], np.float64)
+    return frames, np.array([right.sum() for _, right in counted], np.float64), what
 
 
 def _labelled(sequence: Beliefs) -> tuple[NDArray[np.str_], Mask]:

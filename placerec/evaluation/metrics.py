@@ -1,5 +1,6 @@
 """How good the beliefs of labelled sequences are, in numbers: readings A17, and the contract's "Evaluation"."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -164,11 +165,9 @@ def change_latencies(truth: Ints, right: Mask) -> Ints:
 
 
 def _check(beliefs: Sequence[Beliefs]) -> None:
-    seen = set()
-    for sequence in beliefs:
-        if sequence.name in seen:
-            raise EvaluationError(f"two sequences are called {sequence.name!r}; rename one file or leave it out")
-        seen.add(sequence.name)
+    for name, times in Counter(sequence.name for sequence in beliefs).items():
+        if times > 1:
+            raise EvaluationError(f"two sequences are called {name!r}; rename one file or leave it out")
     if any(any(sequence.truth) for sequence in beliefs):
         return
     names = ", ".join(sequence.name for sequence in beliefs[:3]) + (", ..." if len(beliefs) > 3 else "")

@@ -24,16 +24,16 @@ THREE = [judged("a", "hhkk", "hhkh"), judged("b", "..hh", "hhkh"), judged("c", "
 
 
 def test_blocks_are_sequences_with_a_label() -> None:
-    blocks, right = count_blocks(THREE)
-    assert blocks.what == "sequences"
-    assert blocks.frames.tolist() == [4, 2, 4]
+    frames, right, what = count_blocks(THREE)
+    assert what == "sequences"
+    assert frames.tolist() == [4, 2, 4]
     assert right.tolist() == [3, 1, 4]
 
 
 def test_the_visits_of_a_single_sequence_are_drawn() -> None:
-    blocks, right = count_blocks([judged("a", "hhk..kkhh", "hkkhhhkhh"), THREE[3]])
-    assert blocks.what == "visits"
-    assert blocks.frames.tolist() == [2, 3, 2]
+    frames, right, what = count_blocks([judged("a", "hhk..kkhh", "hkkhhhkhh"), THREE[3]])
+    assert what == "visits"
+    assert frames.tolist() == [2, 3, 2]
     assert right.tolist() == [1, 2, 2]
 
 

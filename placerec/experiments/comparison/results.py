@@ -60,14 +60,14 @@ def judge(runs: Mapping[str, MethodRun], cost: FrontEndCost, seed: int) -> Compa
     """The scores of all methods with intervals over the same draws, and every pair."""
     evaluations = {name: evaluate(run.beliefs) for name, run in runs.items()}
     counted = {name: count_blocks(run.beliefs) for name, run in runs.items()}
-    blocks, _ = next(iter(counted.values()))
-    right = {name: frames for name, (_, frames) in counted.items()}
-    drawn = draw(len(blocks.frames), seed)
+    frames, _, what = next(iter(counted.values()))
+    right = {name: one for name, (_, one, _) in counted.items()}
+    drawn = draw(len(frames), seed)
     scores = tuple(
         MethodScore(
             name,
             evaluation.accuracy,
-            *interval(drawn, right[name], blocks.frames),
+            *interval(drawn, right[name], frames),
             evaluation.balanced_accuracy,
             evaluation.change_latency_frames,
             evaluation.ece,
@@ -79,11 +79,11 @@ def judge(runs: Mapping[str, MethodRun], cost: FrontEndCost, seed: int) -> Compa
     one = next(iter(evaluations.values()))
     return Comparison(
         scores,
-        tuple(compare_pairs(right, blocks.frames, drawn)),
+        tuple(compare_pairs(right, frames, drawn)),
         one.frames,
         one.majority_accuracy,
         one.majority_place,
-        (len(blocks.frames), blocks.what),
+        (len(frames), what),
         cost,
     )
 

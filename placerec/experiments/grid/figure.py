@@ -49,7 +49,10 @@ def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, na
         for axes, (size, smoothing) in zip(grid.ravel(), panels, strict=True):
             own = [row for row in rows if (row.size, row.smoothing) == (size, smoothing)]
             _bars(axes, own, plan, accuracy)
-            _lines(axes, own, baselines)
+            settings = sorted({row.setting for row in own})
+            for kind, label, style in _BASELINES:
+                level = 100 * float(np.mean([np.mean(baselines[kind][setting]) for setting in settings]))
+                axes.axhline(level, linestyle=style, color="black", linewidth=1.1, label=label)
             axes.set_title(f"S = {size}, {smoothing}", loc="left", fontsize=10)
             axes.set_ylim(lowest, 100)
         for axes in grid[:, 0]:
@@ -75,13 +78,6 @@ def _bars(axes: "Axes", rows: Sequence[Row], plan: Config, accuracy: Mapping[Set
     axes.set_xticks(range(len(orders)), labels=[f"n = {order}" for order in orders], fontsize=8.5)
     axes.tick_params(axis="y", labelsize=8)
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def _lines(axes: "Axes", rows: Sequence[Row], baselines: Mapping[str, Mapping[Setting, Sequence[float]]]) -> None:
-    settings = {row.setting for row in rows}
-    for kind, label, style in _BASELINES:
-        height = 100 * float(np.mean([np.mean(baselines[kind][setting]) for setting in sorted(settings)]))
-        axes.axhline(height, linestyle=style, color="black", linewidth=1.1, label=label)
 
 
 def draw_strips(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Path, width: float) -> None:

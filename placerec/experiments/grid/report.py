@@ -18,7 +18,7 @@ from placerec.experiments.grid.claims import HIGH, Claim, Statement, judge
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
 from placerec.experiments.grid.results import Results, Row, Setting, by_seed
-from placerec.experiments.store import WordsJob, key_of, load, save
+from placerec.experiments.store import key_of, load, save
 from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
 from placerec.hohmm import Beliefs
@@ -259,17 +259,12 @@ def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
         images = _of(jobs, best)[0].images
         if images is not None:
             yield heading("The words")
-            _draw_words(images, folder / "words.png")
+            sequences = [one.sequence for one in images.test]
+            words = word_table(Descriptors.concat([one.load() for one in images.test]), Dictionary.load(images.words))
+            title = f"The words of S = {best.size}, seed 0, among the test frames"
+            draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title=title)
             caption = f"The words of S = {best.size}, seed 0, among the test frames of the first fold."
             yield picture(folder / "words.png", "For each word a typical frame", caption)
-
-
-def _draw_words(job: WordsJob, path: Path) -> None:
-    """Draw what the words look like among the test frames, as `placerec show-words` does."""
-    sequences = [one.sequence for one in job.test]
-    words = word_table(Descriptors.concat([one.load() for one in job.test]), Dictionary.load(job.words))
-    title = f"The words of S = {job.options.size}, seed {job.options.seed}, among the test frames"
-    draw_word_sheet(words, typical_images(words, sequences), path, title=title)
 
 
 def _versions() -> str:
