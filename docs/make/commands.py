@@ -119,7 +119,7 @@ def values(option: click.Option) -> str:
 
 def default(option: click.Option) -> str:
     """The default, if --help shows it."""
-    if not option.show_default or option.default is None:
+    if not isinstance(option.default, int | float | str) or (option.is_flag and not option.secondary_opts):
         return ""
     if option.is_flag:
         return f"default: `{(option.opts if option.default else option.secondary_opts)[0]}`"
