@@ -9,7 +9,6 @@ Good-Turing's factors and Kneser-Ney's discounts are fitted on counts of counts.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -54,31 +53,27 @@ def witten_bell(count: Floats, context: Context, V: int) -> tuple[Floats, Floats
 
 def additive(delta: float) -> Discount:
     """SRILM's -addsmooth: (c + delta) / (T + V delta) for seen n-grams; the lower order is reached by back-off only."""
-    return partial(_additive, max(0.0, delta))
-
-
-def _additive(delta: float, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
-    return (1 + delta / count) / (1 + V * delta / context.total), np.zeros_like(count)
+    delta = max(0.0, delta)
+    return lambda count, context, V: ((1 + delta / count) / (1 + V * delta / context.total), np.zeros_like(count))
 
 
 def lidstone(delta: float) -> Discount:
     """Interpolated Lidstone: V delta imagined occurrences after each context, spread as the shorter context says."""
-    return partial(_lidstone, delta)
 
+    def shared(count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+        mass = V * delta
+        return context.total / (context.total + mass), mass / (context.total + mass)
 
-def _lidstone(delta: float, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
-    mass = V * delta
-    return context.total / (context.total + mass), mass / (context.total + mass)
+    return shared
 
 
 def absolute(discount: float) -> Discount:
     """Ney's absolute discounting: a constant, cut to 0..1, is taken off every count."""
-    return partial(_absolute, min(1.0, max(0.0, discount)))
-
-
-def _absolute(discount: float, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
-    factor = np.where(count < discount, 0.0, (count - discount) / count)
-    return factor, discount * context.types / np.ceil(context.total)
+    off = min(1.0, max(0.0, discount))
+    return lambda count, context, V: (
+        np.where(count < off, 0.0, (count - off) / count),
+        off * context.types / np.ceil(context.total),
+    )
 
 
 def natural(count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
@@ -90,24 +85,22 @@ def natural(count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
 
 def good_turing(factors: Sequence[float]) -> Discount:
     """Good-Turing: `factors[c]` for counts c below len(factors), 1 above."""
-    return partial(_good_turing, np.array([*factors, 1.0]))
-
-
-def _good_turing(factors: Floats, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
-    return factors[np.minimum(count, len(factors) - 1).astype(np.int64)], np.zeros_like(count)
+    kept = np.array([*factors, 1.0])
+    return lambda count, context, V: (
+        kept[np.minimum(count, len(kept) - 1).astype(np.int64)],
+        np.zeros_like(count),
+    )
 
 
 def modified_kneser_ney(d1: float, d2: float, d3: float) -> Discount:
     """Chen & Goodman 1998: a discount each for counts of 1, 2, and 3 or more (of left neighbours, at lower orders)."""
-    return partial(_modified_kneser_ney, d1, d2, d3)
 
+    def shared(count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+        off = np.select([count == 1, count == 2], [d1, d2], d3)
+        types, twos, threes = context.types, context.types2, context.types3
+        return (count - off) / count, (d1 * (types - twos) + d2 * (twos - threes) + d3 * threes) / context.total
 
-def _modified_kneser_ney(
-    d1: float, d2: float, d3: float, count: Floats, context: Context, V: int
-) -> tuple[Floats, Floats]:
-    discount = np.select([count == 1, count == 2], [d1, d2], d3)
-    types, twos, threes = context.types, context.types2, context.types3
-    return (count - discount) / count, (d1 * (types - twos) + d2 * (twos - threes) + d3 * threes) / context.total
+    return shared
 
 
 def counts_of_counts(counts: NgramCounts, n: int, top: int, predictable: Mask, meta: Ints) -> Ints:

@@ -25,16 +25,21 @@ def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5)
     """
     model = read_arpa(path)
     sums = np.concatenate([totals for _, _, totals in context_sums(model)])
+    comment = read_text(Path(path), LanguageModelError).partition("\n")[0]
+    try:
+        explained = [explain(model, ngram.split()) for ngram in ngrams]
+    except LanguageModelError as error:
+        raise LanguageModelError(f"{path}: {error}") from error
     return {
         "path": str(path),
-        "comment": _comment(path),
+        "comment": comment if comment.startswith("#") else "",
         "order": model.order,
         "ngrams_per_order": [len(keys) for keys in model.trie.keys],
         "contexts": len(sums),
         "lowest_sum": float(sums.min()),
         "highest_sum": float(sums.max()),
         "most_frequent": [most_frequent(model, n, top) for n in range(1, model.order + 1)],
-        "explained": [_explained(path, model, ngram) for ngram in ngrams],
+        "explained": explained,
     }
 
 
@@ -50,13 +55,6 @@ def most_frequent(model: BackoffModel, n: int, top: int) -> list[dict[str, Any]]
     first = np.argsort(-joint, kind="stable")[:top]
     texts = model.trie.texts(n) if len(first) else []
     return [{"ngram": texts[row], "p": _finite(10 ** float(joint[row]))} for row in first.tolist()]
-
-
-def _explained(path: Path | str, model: BackoffModel, ngram: str) -> dict[str, Any]:
-    try:
-        return explain(model, ngram.split())
-    except LanguageModelError as error:
-        raise LanguageModelError(f"{path}: {error}") from error
 
 
 def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:
@@ -130,11 +128,6 @@ def _explanation(explained: dict[str, Any]) -> list[str]:
             lines.append(f"  {step['ngram']!r} is not listed, nor is its context {step['context']!r}: nothing to pay")
     lines.append(f"  log10 p = {' + '.join(terms)} = {_show(explained['log10_p'])}, p = {explained['p']:.7g}")
     return lines
-
-
-def _comment(path: Path | str) -> str:
-    first = read_text(Path(path), LanguageModelError).partition("\n")[0]
-    return first if first.startswith("#") else ""
 
 
 def _finite(value: float) -> float | None:

@@ -62,7 +62,9 @@ def smoothing(name: str, delta: float | None = None) -> Smoothing:
     if not 0 < delta < float("inf") or (base == "absolute" and delta > 1):
         bounds = "above 0 and at most 1" if base == "absolute" else "above 0"
         raise LanguageModelError(f"delta {delta:g} must be a number {bounds}: it is what unseen words live on")
-    return Smoothing(name, _FITS[name](delta), name == base, delta if base in ("lidstone", "absolute") else None)
+    return Smoothing(
+        name, _FITS.get(name, _FITS[base])(delta), name == base, delta if base in ("lidstone", "absolute") else None
+    )
 
 
 def default_delta(name: str) -> float:
@@ -111,19 +113,15 @@ def _explained(n: int, tally: list[int], compute: Callable[[], T]) -> T:
         ) from error
 
 
+# Those that are fitted alike for interpolation and for back-off stand under the former's name.
 _FITS: dict[str, Callable[[float], Fit]] = {
     "witten-bell": lambda delta: _fixed(witten_bell),
-    "witten-bell-backoff": lambda delta: _fixed(witten_bell),
     "lidstone": lambda delta: _fixed(lidstone(delta)),
     "lidstone-backoff": lambda delta: _fixed(additive(delta)),
     "absolute": lambda delta: _fixed(absolute(delta)),
-    "absolute-backoff": lambda delta: _fixed(absolute(delta)),
     "kneser-ney": lambda delta: _kneser_ney,
-    "kneser-ney-backoff": lambda delta: _kneser_ney,
     "modified-kneser-ney": lambda delta: _modified_kneser_ney,
-    "modified-kneser-ney-backoff": lambda delta: _modified_kneser_ney,
 }
-SMOOTHINGS = tuple(_FITS)
 
 # The options of ngram-count for each smoothing; None: it has none.
 SRILM_OPTIONS: dict[str, str | None] = {
@@ -138,3 +136,4 @@ SRILM_OPTIONS: dict[str, str | None] = {
     "modified-kneser-ney": "-kndiscount -interpolate",
     "modified-kneser-ney-backoff": "-kndiscount",
 }
+SMOOTHINGS = tuple(SRILM_OPTIONS)
