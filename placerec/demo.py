@@ -13,8 +13,7 @@ from placerec.figures.canvas import figure_file
 from placerec.figures.evaluation import plot_evaluation
 from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import whole_folder, write_text
-from placerec.frames import Sequence as FrameSequence
-from placerec.frames import find_sequences, read_gray
+from placerec.frames import Sequence as FrameSequence, find_sequences, read_gray
 from placerec.hohmm import Beliefs, write_beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import WordTable, typical_images, word_sentences, word_table

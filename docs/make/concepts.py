@@ -10,8 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from placerec.reference import Model, backed_off, count, smoothed
-from placerec.reference import belief as beliefs
+from placerec.reference import Model, backed_off, belief as beliefs, count, smoothed
 
 WORDS = ("w1", "w2", "w3", "w4")
 # Two drives; each frame with its place and its word.

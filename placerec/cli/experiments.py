@@ -40,8 +40,7 @@ def compare(train: tuple[Path, ...], tests: tuple[Path, ...], methods: str | Non
     TRAIN; accuracy with its interval, cost per frame, and for every two methods whether their difference holds.
     """
     from placerec.experiments.comparison.results import format_comparison
-    from placerec.experiments.comparison.run import check_methods
-    from placerec.experiments.comparison.run import compare as run
+    from placerec.experiments.comparison.run import check_methods, compare as run
 
     with shared.usage("--methods"):
         chosen = check_methods(None if methods is None else methods.split(","))

@@ -146,8 +146,7 @@ def show_frame(
     and scale, and the units of the map that are nearest to it. With SOURCE, which is what tokenize takes, it is told
     what these units look like, and which place they mostly belong to, among the frames there.
     """
-    from placerec.inspection.frame import format_frame
-    from placerec.inspection.frame import show_frame as run
+    from placerec.inspection.frame import format_frame, show_frame as run
 
     with shared.progress_bar("describe") as progress:
         view = run(image, words, sources, out, progress=progress, **how)
@@ -168,8 +167,7 @@ def stability(sources: tuple[Path, ...], words: Path, out: Path | None, as_json:
     pixel and another resize filter; told is the share of frames that get another word, and how many of these words
     are next to the right one on the map.
     """
-    from placerec.inspection.word_stability import format_stability
-    from placerec.inspection.word_stability import stability as run
+    from placerec.inspection.word_stability import format_stability, stability as run
 
     with shared.progress_bar("stability") as progress:
         found = run(sources, words, out, progress=progress, **how)

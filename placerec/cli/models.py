@@ -88,8 +88,7 @@ def train_lm(
 
     TOKENS are token streams (.tsv), folders of them, or one folder of sentences: PLACE.txt, one visit a line.
     """
-    from placerec.model import ModelOptions, parse_min_count
-    from placerec.model import train_lm as run
+    from placerec.model import ModelOptions, parse_min_count, train_lm as run
     from placerec.words import parse_selection
 
     with shared.usage("--min-count"):

@@ -21,8 +21,7 @@ import numpy as np
 
 from placerec.errors import ExperimentError, OutputError, PlacerecError, VisionError
 from placerec.files import content_digest, content_digest_of_file, held_folder, read_text, sweep_files, write_text
-from placerec.frames import Sequence as FrameSequence
-from placerec.frames import files_of
+from placerec.frames import Sequence as FrameSequence, files_of
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.version import __version__

@@ -28,8 +28,7 @@ from placerec.frames.layouts import (
 )
 from placerec.frames.naming import own_name, unique_names
 from placerec.frames.places import check_place, check_twins, checked_place
-from placerec.frames.recordings import WANTED as RECORDED
-from placerec.frames.recordings import checked_seconds, find_intervals, is_recording, read_recording
+from placerec.frames.recordings import WANTED as RECORDED, checked_seconds, find_intervals, is_recording, read_recording
 from placerec.frames.sequence import Frame, Sequence, SourceOptions
 
 log = logging.getLogger(__name__)

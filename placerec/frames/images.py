@@ -3,8 +3,7 @@
 A batch is the unit of work that is handed out, kept, and done again if it was lost.
 """
 
-from collections.abc import Callable, Iterable, Iterator
-from collections.abc import Sequence as Ordered
+from collections.abc import Callable, Iterable, Iterator, Sequence as Ordered
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path

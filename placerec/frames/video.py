@@ -70,7 +70,9 @@ def list_times(path: Path) -> "array[float]":
             times = _increasing(_walked(path, capture), 1 / (_property(capture, "FPS") or 25))
     with _opened(path) as capture:
         if not times or not any(_grab(capture) for _ in times):
-            codec = _codec(capture)
+            code = int(_property(capture, "FOURCC")) & 0xFFFFFFFF
+            text = code.to_bytes(4, "little").decode("latin-1").strip()
+            codec = text if text.isprintable() and text else "unknown"
             raise SourceError(f"{path}: OpenCV can decode no frame of it (codec {codec}); convert it to H.264")
         _tell_truncated(path, capture, times)
     return times
@@ -166,12 +168,6 @@ def _property(capture: Any, name: str) -> float:
     import cv2
 
     return float(capture.get(getattr(cv2, f"CAP_PROP_{name}")))
-
-
-def _codec(capture: Any) -> str:
-    code = int(_property(capture, "FOURCC")) & 0xFFFFFFFF
-    text = code.to_bytes(4, "little").decode("latin-1").strip()
-    return text if text.isprintable() and text else "unknown"
 
 
 def _check_readable(path: Path) -> None:

@@ -16,26 +16,20 @@ _ROOMS = {
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 
 if TYPE_CHECKING:
-    from placerec.lm.arpa import format_arpa, read_arpa, with_unigrams, write_arpa
-    from placerec.lm.backoff import BackoffModel
-    from placerec.lm.counts import NgramCounts, count_ngrams, format_counts
-    from placerec.lm.estimation import estimate
-    from placerec.lm.smoothings import SMOOTHINGS, Smoothing, smoothing
-
-__all__ = [
-    "SMOOTHINGS",
-    "BackoffModel",
-    "NgramCounts",
-    "Smoothing",
-    "count_ngrams",
-    "estimate",
-    "format_arpa",
-    "format_counts",
-    "read_arpa",
-    "smoothing",
-    "with_unigrams",
-    "write_arpa",
-]
+    from placerec.lm.arpa import (
+        format_arpa as format_arpa,
+        read_arpa as read_arpa,
+        with_unigrams as with_unigrams,
+        write_arpa as write_arpa,
+    )
+    from placerec.lm.backoff import BackoffModel as BackoffModel
+    from placerec.lm.counts import (
+        NgramCounts as NgramCounts,
+        count_ngrams as count_ngrams,
+        format_counts as format_counts,
+    )
+    from placerec.lm.estimation import estimate as estimate
+    from placerec.lm.smoothings import SMOOTHINGS as SMOOTHINGS, Smoothing as Smoothing, smoothing as smoothing
 
 
 def __getattr__(name: str) -> Any:

@@ -138,7 +138,9 @@ def check_model(path: Path | str, *, tokens: int = 2000, seed: int = 0) -> Model
     words = generated_stream(model, tokens, seed)
     difference = None
     if model.order <= KENLM_MAX_ORDER:
-        difference = _largest_difference(model.score(words), kenlm_scorer(path)(words))
+        ours, theirs = model.score(words), kenlm_scorer(path)(words)
+        nowhere = (ours < ABOUT_LOG_ZERO) & (theirs < ABOUT_LOG_ZERO)
+        difference = float(np.abs(np.where(nowhere, 0.0, ours) - np.where(nowhere, 0.0, theirs)).max(initial=0.0))
     return ModelCheck(
         path=str(path),
         order=model.order,
@@ -149,11 +151,6 @@ def check_model(path: Path | str, *, tokens: int = 2000, seed: int = 0) -> Model
         tokens=len(words) if difference is not None else 0,
         largest_difference=difference,
     )
-
-
-def _largest_difference(ours: Floats, theirs: Floats) -> float:
-    zero = (ours < ABOUT_LOG_ZERO) & (theirs < ABOUT_LOG_ZERO)
-    return float(np.abs(np.where(zero, 0.0, ours) - np.where(zero, 0.0, theirs)).max(initial=0.0))
 
 
 def kenlm_scorer(path: Path | str) -> Scorer:

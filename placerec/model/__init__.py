@@ -1,27 +1,14 @@
 """The MODEL/ folder: train, load."""
 
-from placerec.model.calibrate import calibrate
-from placerec.model.corpus import Corpus, read_corpus
-from placerec.model.decoding import Decoding, load_recognizer, make_recognizer, transition_of
-from placerec.model.folder import PlaceModels, load_model
-from placerec.model.options import ModelOptions, parse_min_count
-from placerec.model.train import estimate_place, train_lm, train_model
-from placerec.model.update import update
-
-__all__ = [
-    "Corpus",
-    "Decoding",
-    "ModelOptions",
-    "PlaceModels",
-    "calibrate",
-    "estimate_place",
-    "load_model",
-    "load_recognizer",
-    "make_recognizer",
-    "parse_min_count",
-    "read_corpus",
-    "train_lm",
-    "train_model",
-    "transition_of",
-    "update",
-]
+from placerec.model.calibrate import calibrate as calibrate
+from placerec.model.corpus import Corpus as Corpus, read_corpus as read_corpus
+from placerec.model.decoding import (
+    Decoding as Decoding,
+    load_recognizer as load_recognizer,
+    make_recognizer as make_recognizer,
+    transition_of as transition_of,
+)
+from placerec.model.folder import PlaceModels as PlaceModels, load_model as load_model
+from placerec.model.options import ModelOptions as ModelOptions, parse_min_count as parse_min_count
+from placerec.model.train import estimate_place as estimate_place, train_lm as train_lm, train_model as train_model
+from placerec.model.update import update as update

@@ -1,8 +1,7 @@
 """Sequences -> descriptors: every frame is read, described and forgotten."""
 
 import logging
-from collections.abc import Iterable
-from collections.abc import Sequence as Ordered
+from collections.abc import Iterable, Sequence as Ordered
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path

@@ -14,8 +14,7 @@ import numpy as np
 from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import SourceError, VisionError
 from placerec.files import content_digest
-from placerec.frames import Frame, read_gray
-from placerec.frames import Sequence as FrameSequence
+from placerec.frames import Frame, Sequence as FrameSequence, read_gray
 from placerec.frames.images import Batch, batches, content_key, with_images
 from placerec.frames.sequence import Gray
 from placerec.frames.table import FrameTable

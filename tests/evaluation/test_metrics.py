@@ -11,8 +11,7 @@ from statistics import median
 import numpy as np
 import pytest
 from helpers.small_world import beliefs_of
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from placerec.errors import EvaluationError

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 from helpers.recordings import START, pictures, stream, write_bag, write_video
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from placerec.errors import SourceError
 from placerec.frames import SourceOptions, find_sequences

@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.frames import Sequence as FrameSequence
-from placerec.frames import SourceOptions, find_sequences
+from placerec.frames import Sequence as FrameSequence, SourceOptions, find_sequences
 from placerec.frames.sequence import Gray
 
 Picture = NDArray[np.uint8]
@@ -105,8 +104,7 @@ def stream(count: int = 20) -> list[Message]:
 def write_bag(path: Path, topics: dict[str, list[Message]], storage: str = "mcap", **options: Any) -> Path:
     """A bag of these messages: `storage` "ros1" is a file, "sqlite3" and "mcap" are folders of ROS 2."""
     from rosbags.rosbag1 import Writer as Writer1
-    from rosbags.rosbag2 import StoragePlugin
-    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.rosbag2 import StoragePlugin, Writer as Writer2
     from rosbags.typesys import Stores, get_typestore
 
     path.parent.mkdir(parents=True, exist_ok=True)

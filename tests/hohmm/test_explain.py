@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from helpers.filter_cases import cases
 from helpers.small_models import WORDS, models_of, novelty, selections
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.errors import ModelError
 from placerec.hohmm import Recognizer, Transition, explain, filter_stream, fixed_transition

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from helpers import plain_filter
 from helpers.filter_cases import Case, cases
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.hohmm import filter, filter_stream, fixed_transition, learned_transition
 from placerec.hohmm.filter import filter_step

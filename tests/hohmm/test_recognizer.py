@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from helpers.filter_cases import transitions
 from helpers.small_models import WORDS, corpora, models_of, novelty, selections
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec import reference
 from placerec.errors import ModelError, StreamError

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from helpers import plain_filter
 from helpers.filter_cases import transitions
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from placerec.errors import ModelError
 from placerec.hohmm import Transition, fixed_transition, learned_transition, prediction, read_transitions

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from placerec.errors import LanguageModelError
 from placerec.lm import NgramCounts, count_ngrams, format_counts

@@ -7,8 +7,7 @@ from dataclasses import replace
 from unittest.mock import patch
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec import reference
 from placerec.lm import NgramCounts, count_ngrams, format_counts

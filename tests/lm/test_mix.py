@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from helpers.mutable_models import mutable_models
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.arrays import Singles
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing

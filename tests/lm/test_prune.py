@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.mutable_models import mutable_models
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.arrays import Ints
 from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa

@@ -1,8 +1,7 @@
 """The hash table: many numbers at once, one at a time, and the numbers again."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.lm.row_index import RowIndex
 

@@ -1,8 +1,7 @@
 """Which n-grams there are, with their prefixes and endings."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.arrays import Ints
 from placerec.lm.trie import build_trie, closed_trie, endings

@@ -11,8 +11,7 @@ import pytest
 from helpers.small_world import VOCABULARY, write_tokens
 from helpers.training_sets import training_set_of, training_sets
 from helpers.typed_commands import done
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from placerec.arrays import Floats
 from placerec.hohmm import Emissions

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from helpers.small_world import write_tokens
 from helpers.training_sets import followed, training_set_of, training_sets
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.arrays import Ints
 from placerec.cli.models import METHODS as NAMED

@@ -5,8 +5,7 @@ from math import inf
 
 import numpy as np
 from helpers.training_sets import followed, training_set_of, training_sets
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from placerec.arrays import Floats
 from placerec.hohmm import filter_stream, fixed_transition

@@ -16,8 +16,7 @@ import pytest
 from helpers.small_world import with_columns, write_images
 
 from placerec.errors import ModelError, SourceError, StreamError
-from placerec.frames import Frame, find_sequences, read_gray
-from placerec.frames import Sequence as FrameSequence
+from placerec.frames import Frame, Sequence as FrameSequence, find_sequences, read_gray
 from placerec.frames.sequence import Gray
 from placerec.hohmm import Belief, Recognizer, format_beliefs
 from placerec.methods import LiveReport, decode, decode_live, follow_live, load_decoder

@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from helpers.training_sets import followed, training_set_of, training_sets
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.arrays import Floats, Ints
 from placerec.methods import TrainingSet, ranganathan2010

@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from helpers.training_sets import followed, training_set_of, training_sets
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.arrays import Floats
 from placerec.errors import ModelError

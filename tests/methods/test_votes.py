@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 from helpers.training_sets import followed, training_set_of, training_sets
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from placerec.hohmm.filter import normalised
 from placerec.methods import TrainingSet, filliat2008, pronobis2010

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.small_world import PLACES, VOCABULARY, run_through, write_tokens, write_world
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from placerec.errors import LanguageModelError, ModelError, OutputError, PlacerecError, SourceError, StreamError
 from placerec.files import held_folder

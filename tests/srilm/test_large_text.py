@@ -12,8 +12,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from placerec.errors import OutputError
 from placerec.srilm.text.streams import Streams

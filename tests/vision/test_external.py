@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.small_world import write_images
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from placerec.errors import VisionError

@@ -3,8 +3,7 @@
 import itertools
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from placerec.errors import StreamError
 from placerec.words import Selection, parse_selection, select, selector

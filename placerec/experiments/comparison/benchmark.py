@@ -16,8 +16,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import SourceError
 from placerec.experiments.store import WordsJob, key_of, load, save
-from placerec.frames import Sequence as FrameSequence
-from placerec.frames import images_at
+from placerec.frames import Sequence as FrameSequence, images_at
 from placerec.frames.sequence import Gray
 from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder
 from placerec.lm.backoff import unite_models

@@ -20,8 +20,7 @@ from placerec.experiments.comparison.results import Comparison, format_methods, 
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
 from placerec.figures.canvas import check_figure
 from placerec.files import whole_folder, write_text
-from placerec.frames import Sequence as FrameSequence
-from placerec.frames import SourceOptions, find_sequences
+from placerec.frames import Sequence as FrameSequence, SourceOptions, find_sequences
 from placerec.frames.naming import own_name, unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
 from placerec.jobs import ProgressBar, silent

@@ -18,8 +18,7 @@ from placerec.experiments.grid.splits import SPLITS, Fold, named_tests
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, make_tokens
 from placerec.figures.canvas import check_figure
 from placerec.files import content_digest_of_file
-from placerec.frames import Sequence as FrameSequence
-from placerec.frames import find_sequences
+from placerec.frames import Sequence as FrameSequence, find_sequences
 from placerec.frames.folder import natural_key
 from placerec.frames.recordings import is_recording
 from placerec.jobs import ProgressBar, map_jobs, silent, workers
