@@ -11,7 +11,16 @@ from placerec.version import __version__
 _ROOMS = {
     "placerec.errors": ("PlacerecError",),
     "placerec.frames": ("Frame", "SourceOptions", "Sequence", "find_sequences", "read_gray"),
-    "placerec.vision": ("DescriptorSpec", "Dictionary", "DictionaryOptions", "describe", "gist", "train_dictionary"),
+    "placerec.vision": (
+        "DescriptorSpec",
+        "Dictionary",
+        "DictionaryOptions",
+        "DictionarySet",
+        "DictionarySetOptions",
+        "describe",
+        "gist",
+        "train_dictionary",
+    ),
     "placerec.words": ("Selection", "WordStream", "parse_selection", "read_stream", "select", "write_stream"),
     "placerec.words.tokenize": ("tokenize",),
     "placerec.lm": ("BackoffModel", "count_ngrams", "estimate", "read_arpa", "smoothing", "write_arpa"),
@@ -70,7 +79,16 @@ if TYPE_CHECKING:
     from placerec.lm.inspect import inspect_model
     from placerec.methods import decode, follow_live, load_decoder
     from placerec.model import Decoding, ModelOptions, calibrate, load_recognizer, train_lm, update
-    from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, gist, train_dictionary
+    from placerec.vision import (
+        DescriptorSpec,
+        Dictionary,
+        DictionaryOptions,
+        DictionarySet,
+        DictionarySetOptions,
+        describe,
+        gist,
+        train_dictionary,
+    )
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
 
@@ -82,6 +100,8 @@ __all__ = [
     "DescriptorSpec",
     "Dictionary",
     "DictionaryOptions",
+    "DictionarySet",
+    "DictionarySetOptions",
     "Frame",
     "ModelOptions",
     "PlacerecError",

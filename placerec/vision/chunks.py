@@ -51,15 +51,16 @@ def first_unusable(rows: Singles) -> int | None:
 class SpooledRows:
     """The chunks of a source, kept for any number of passes; as a stream, too.
 
-    `each` maps functions over them; workers on other machines have copies of their own.
+    `each` maps functions over them; workers on other machines have copies of their own. `rows`: how many there are.
     """
 
     def __init__(self, file: IO[bytes], source: Source, work: Executor | None) -> None:
         self._file = file
-        self._count, self._width = 0, 0
+        self._count, self._width, self.rows = 0, 0, 0
         for rows in chunks(source):
             file.write(rows.astype(np.float32, copy=False).tobytes())
             self._count, self._width = self._count + 1, rows.shape[1]
+            self.rows += len(rows)
         self.each: ScatteredMap[Singles] = scatter(self, work)
 
     def __len__(self) -> int:

@@ -1,8 +1,9 @@
 """The visual dictionary: descriptor -> PCA -> unit of a self-organising map -> word."""
 
 import logging
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+import re
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,17 +15,20 @@ from placerec.errors import VisionError
 from placerec.frames.sequence import Gray
 from placerec.jobs import Executor
 from placerec.version import __version__
-from placerec.vision.chunks import Source, chunks, first_unusable, spooled
+from placerec.vision.chunks import Source, spooled
 from placerec.vision.describe import Descriptors
+from placerec.vision.learning import Quality, checked_rows, learn_map, training_rows
+from placerec.vision.options import DictionaryOptions
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
-from placerec.vision.som import RULES, WIDTH, EpochProgress, MapQuality, Units, map_quality, nearest_units, train_som
+from placerec.vision.som import EpochProgress, MapQuality, Units, map_quality, nearest_units
 from placerec.vision.spec import DescriptorSpec, descriptor
 from placerec.vision.storage import Arrays, fingerprint, read_npz, write_npz
 
 log = logging.getLogger(__name__)
 
-FORMAT, VERSION = "placerec-words", 1
-UNITS = ("live", "all")
+FORMAT = "placerec-words"
+ONE, SEVERAL = 1, 2  # versions of the file
+_NAME = re.compile(r"[a-z]+[0-9]+")
 _REMEDY = "make it again with `placerec train-words`"
 _ARRAYS = {  # name -> type and axes: d values, k components, K units
     "mean": (np.float64, "d"),
@@ -35,64 +39,12 @@ _ARRAYS = {  # name -> type and axes: d values, k components, K units
 }
 
 
-@dataclass(frozen=True)
-class DictionaryOptions:
-    """How a dictionary of size x size words is learned: the options of `train-words`.
-
-    `components`: how many principal components the map sees. `fraction`: the share of the frames, drawn by `seed`,
-    that PCA and map see. `units`: answer with those that at least one training frame hit (`live`: no language model
-    can know the others), or with `all`. `rule`, `width`, `epochs`: how the map learns, see `train_som`. Raises
-    VisionError for a value that cannot be used.
-    """
-
-    size: int = 10
-    components: int = 80
-    seed: int = 0
-    fraction: float = 1.0
-    epochs: int | None = None
-    units: str = "live"
-    rule: str = "batch"
-    width: float = WIDTH
-
-    def __post_init__(self) -> None:
-        for name in ("size", "components", "epochs"):
-            value = getattr(self, name)
-            if not (isinstance(value, int) and value >= 1) and not (name == "epochs" and value is None):
-                raise VisionError(f"{name} {value} cannot be used; give a number of 1 or more")
-        if not isinstance(self.seed, int) or self.seed < 0:
-            raise VisionError(f"seed {self.seed} cannot be used; give a number of 0 or more")
-        if not isinstance(self.fraction, float | int) or not 0 < self.fraction <= 1:
-            raise VisionError(f"fraction {self.fraction} cannot be used; give a number above 0 and up to 1")
-        if not isinstance(self.width, float | int) or not 0 < self.width < np.inf:
-            raise VisionError(f"width {self.width} cannot be used; give a number above 0")
-        for name, value, choices in (("choice of units", self.units, UNITS), ("rule", self.rule, RULES)):
-            if value not in choices:
-                raise VisionError(f"no {name} is called {value!r}; choose one of {', '.join(choices)}")
-
-
-@dataclass(frozen=True)
-class Quality:
-    """What came of it, over the frames that were used; the errors, entropy and dead units are those of `MapQuality`.
-
-    `explained`: the share of the variance that the components keep; `needed`: the components that would keep 99 %.
-    """
-
-    frames: int
-    used: int
-    epochs: int
-    explained: float
-    needed: int
-    quantisation_error: float
-    topographic_error: float
-    entropy: float
-    dead: int
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Dictionary:
     """PCA + map: codebook float32 (K, k) and hits int64 (K,), the training frames per unit, row-major on the map.
 
-    `sequences`: the names of the recordings that it was learnt from, as far as they are known.
+    `sequences`: the names of the recordings that it was learnt from, as far as they are known. `name`: what a
+    `DictionarySet` calls it, no part of a file of one.
     """
 
     spec: DescriptorSpec
@@ -102,6 +54,8 @@ class Dictionary:
     training: DictionaryOptions
     quality: Quality
     sequences: tuple[str, ...] = ()
+    _: KW_ONLY
+    name: str = ""
 
     @classmethod
     def fit(
@@ -121,31 +75,11 @@ class Dictionary:
         (`cluster.cluster`). The bytes that `save` writes depend on descriptors and options alone, whoever does the
         work. Raises VisionError for unusable descriptors.
         """
-        size = options.size
-        rng = np.random.Generator(np.random.PCG64(options.seed))
-        source = _checked(descriptors, spec)
-        frames = None
-        if options.fraction < 1:
-            frames = len(source) if isinstance(source, np.ndarray) else sum(map(len, chunks(source)))
-            source = _drawn(source, frames, options.fraction, rng)
-        data = moments(source, work)
-        pca = fit_pca(data, options.components)
-        if data.n < size * size:
-            log.warning("%d frames cannot fill the %d words of a map of size %d", data.n, size * size, size)
+        rows = training_rows(descriptors, spec, options)
+        pca = fit_pca(moments(rows.source, work), options.components)
         # A fifth of the descriptors, for many passes.
-        with spooled(projected(source, pca), work) as codes:
-            som = train_som(
-                codes,
-                size,
-                rng=rng,
-                rule=options.rule,
-                width=options.width,
-                epochs=options.epochs,
-                progress=progress,
-            )
-            got = map_quality(codes, som.codebook, som.hits)
-        errors = got.quantisation_error, got.topographic_error, got.entropy, got.dead
-        quality = Quality(frames or data.n, data.n, som.epochs, pca.explained, pca.needed, *errors)
+        with spooled(projected(rows.source, pca), work) as codes:
+            som, quality = learn_map(codes, pca, rows, options, progress)
         return cls(spec, pca, som.codebook, som.hits, options, quality)
 
     def __repr__(self) -> str:
@@ -155,9 +89,9 @@ class Dictionary:
 
     @cached_property
     def vocabulary(self) -> tuple[str, ...]:
-        """The K words in index order: "w" and the index, zero-padded to the digits of K - 1."""
-        digits = len(str(len(self.codebook) - 1))
-        return tuple(f"w{unit:0{digits}d}" for unit in range(len(self.codebook)))
+        """The K words in index order: "w" and the index, zero-padded to the digits of K - 1; "pn10.w07" with a name."""
+        digits, start = len(str(len(self.codebook) - 1)), f"{self.name}.w" if self.name else "w"
+        return tuple(f"{start}{unit:0{digits}d}" for unit in range(len(self.codebook)))
 
     @property
     def dead(self) -> int:
@@ -178,7 +112,11 @@ class Dictionary:
         A frame's answer does not depend on the frames around it. Raises VisionError for unusable descriptors, and for
         `Descriptors` of another kind; of what kind a bare array is only its maker can know.
         """
-        return nearest_units(self._codes(descriptors), self._units)
+        return self.words_at(self._codes(descriptors))
+
+    def words_at(self, codes: Singles) -> tuple[Ints, Singles]:
+        """What `words` gives for descriptors that were projected already: coordinates float32 (n, k) in PCA space."""
+        return nearest_units(codes, self._units)
 
     def quality_of(self, descriptors: Singles | Descriptors) -> MapQuality:
         """How well the map represents these frames, for instance of recordings that trained nothing."""
@@ -194,114 +132,179 @@ class Dictionary:
 
     def save(self, path: Path | str) -> None:
         """Write words.npz: arrays and a JSON string `meta`, no pickle; the same dictionary gives the same bytes."""
-        meta = {
-            "format": FORMAT,
-            "version": VERSION,
-            "placerec": __version__,
-            "descriptor": self.spec.as_dict(),
-            "training": asdict(self.training),
-            "quality": asdict(self.quality),
-            "sequences": list(self.sequences),
-        }
-        write_npz(Path(path), self._arrays(), meta)
+        write_dictionaries(Path(path), (self,))
 
     @classmethod
     def load(cls, path: Path | str) -> "Dictionary":
         """Read and check what `save` wrote; VisionError names the file, what is wrong with it, and the remedy."""
-        try:
-            arrays, meta = read_npz(Path(path), tuple(_ARRAYS))
-            return _restored(arrays, meta)
-        except VisionError as error:
-            remedy = "name another" if str(error) == "no such file" else _REMEDY
-            raise VisionError(f"{path}: {error}; {remedy}") from error
+        dictionaries = read_dictionaries(Path(path))
+        if len(dictionaries) > 1:
+            raise VisionError(f"{path}: holds {len(dictionaries)} dictionaries; read it with DictionarySet.load")
+        return dictionaries[0]
 
     @cached_property
     def _units(self) -> Units:
         return Units.of(self.codebook, self.hits > 0 if self.training.units == "live" else None)
 
     def _codes(self, descriptors: Singles | Descriptors) -> Singles:
-        if isinstance(descriptors, Descriptors):
-            if descriptors.spec != self.spec:
-                raise VisionError(
-                    f"the descriptors are of another kind ({descriptors.spec}) than the dictionary's ({self.spec}); "
-                    "describe the images with the dictionary's"
-                )
-            descriptors = descriptors.values
-        return project(_check(descriptors, self.spec), self.pca)
+        return project(rows_to_look_up(descriptors, self.spec), self.pca)
 
     def _arrays(self) -> Arrays:
-        pca = {name: getattr(self.pca, name) for name in ("mean", "components", "variances")}
-        return {**pca, "codebook": self.codebook, "hits": self.hits}
+        return {**_of_pca(self.pca), "codebook": self.codebook, "hits": self.hits}
 
 
-def _checked(descriptors: Source, spec: DescriptorSpec) -> Source:
-    if not callable(descriptors):
-        return _check(descriptors, spec)
-    give = descriptors
-
-    def pieces() -> Iterator[Singles]:
-        first = 0
-        for piece in give():
-            yield _check(piece, spec, first)
-            first += len(piece)
-
-    return pieces
+def rows_to_look_up(descriptors: Singles | Descriptors, spec: DescriptorSpec) -> Singles:
+    """The descriptors as float32 (n, d); VisionError for unusable ones and for `Descriptors` of another kind."""
+    if isinstance(descriptors, Descriptors):
+        if descriptors.spec != spec:
+            raise VisionError(
+                f"the descriptors are of another kind ({descriptors.spec}) than the dictionary's ({spec}); "
+                "describe the images with the dictionary's"
+            )
+        descriptors = descriptors.values
+    return checked_rows(descriptors, spec)
 
 
-def _check(descriptors: Singles, spec: DescriptorSpec, first: int = 0) -> Singles:
-    """The descriptors as float32; `first`: the index of their first row, for the message."""
-    rows = np.asarray(descriptors)
-    if rows.ndim != 2 or rows.dtype.kind not in "uif":
-        raise VisionError(f"descriptors are float32 (n, {spec.length}), and these are {rows.dtype} {rows.shape}")
-    if rows.shape[1] != spec.length:
-        raise VisionError(f"the descriptors have {rows.shape[1]} values, and the dictionary's have {spec.length}")
-    rows = rows.astype(np.float32, copy=False)
-    bad = first_unusable(rows)
-    if bad is not None:
-        raise VisionError(f"descriptor {first + bad} (from 0) holds NaN or infinite values; leave it out")
-    return rows
+def write_dictionaries(path: Path, dictionaries: tuple[Dictionary, ...]) -> None:
+    """Write words.npz of one dictionary, or of several: arrays of the first under plain names, others' as `hits.NAME`.
+
+    A projection that several share is written once; `components.VIEW` is that of the first one named VIEW and a number.
+    """
+    first = dictionaries[0]
+    meta = {
+        "format": FORMAT,
+        "version": ONE,
+        "placerec": __version__,
+        "descriptor": first.spec.as_dict(),
+        "sequences": list(first.sequences),
+    }
+    arrays = first._arrays()
+    if len(dictionaries) == 1:
+        write_npz(path, arrays, {**meta, "training": asdict(first.training), "quality": asdict(first.quality)})
+        return
+    views = {id(first.pca): ""}
+    members = []
+    for one in dictionaries:
+        view = views.setdefault(id(one.pca), view_of(one.name))
+        if one is not first:
+            arrays |= _named(_of_pca(one.pca), view) if view else {}
+            arrays |= _named({"codebook": one.codebook, "hits": one.hits}, one.name)
+        told = {"training": asdict(one.training), "quality": asdict(one.quality)}
+        members.append({"name": one.name, "projection": view, **told})
+    write_npz(path, arrays, {**meta, "version": SEVERAL, "dictionaries": members})
 
 
-def _drawn(source: Source, n: int, fraction: float, rng: np.random.Generator) -> Source:
-    """`fraction` of the n rows of a source, at least one, in their order."""
-    kept = np.zeros(n, np.bool_)
-    kept[rng.permutation(n)[: max(1, round(fraction * n))]] = True
-
-    def pieces() -> Iterator[Singles]:
-        first = 0
-        for rows in chunks(source):
-            yield rows[kept[first : first + len(rows)]]
-            first += len(rows)
-
-    return pieces
+def read_dictionaries(path: Path) -> tuple[Dictionary, ...]:
+    """Read and check what `write_dictionaries` wrote; VisionError as `Dictionary.load` says."""
+    try:
+        arrays, meta = read_npz(path, tuple(_ARRAYS), _more_arrays)
+        return _restored(arrays, meta)
+    except VisionError as error:
+        remedy = "name another" if str(error) == "no such file" else _REMEDY
+        raise VisionError(f"{path}: {error}; {remedy}") from error
 
 
-def _restored(arrays: Arrays, meta: dict[str, Any]) -> Dictionary:
+def view_of(name: str) -> str:
+    """The view in the name of a dictionary: `pn` of `pn10`."""
+    return name.rstrip("0123456789")
+
+
+def _of_pca(pca: Pca) -> Arrays:
+    return {name: getattr(pca, name) for name in ("mean", "components", "variances")}
+
+
+def _named(arrays: Arrays, suffix: str) -> Arrays:
+    return {f"{name}.{suffix}": array for name, array in arrays.items()} if suffix else arrays
+
+
+@dataclass(frozen=True)
+class _Member:
+    """What `meta` tells of a dictionary of the file."""
+
+    name: str
+    projection: str
+    training: DictionaryOptions
+    quality: Quality
+
+    def arrays(self) -> dict[str, str]:
+        """The names of the arrays, under the names that a dictionary alone gives them."""
+        return {name: ".".join(filter(None, (name, self._suffix(name)))) for name in _ARRAYS}
+
+    def _suffix(self, array: str) -> str:
+        return self.name if array in ("codebook", "hits") else self.projection
+
+
+def _members(meta: dict[str, Any]) -> list[_Member]:
+    """The dictionaries that a file tells of, the first without a name; VisionError for what is no such file."""
     if meta.get("format") != FORMAT:
         raise VisionError("it is not a dictionary of placerec")
-    if meta.get("version") != VERSION:
-        raise VisionError(f"it has format version {meta.get('version')}, and this placerec reads {VERSION}")
+    if meta.get("version") not in (ONE, SEVERAL):
+        raise VisionError(f"it has format version {meta.get('version')}, and this placerec reads {ONE} and {SEVERAL}")
     try:
-        spec, training = DescriptorSpec(**meta["descriptor"]), DictionaryOptions(**meta["training"])
-        quality = Quality(**meta["quality"])
+        told = meta["dictionaries"] if meta["version"] == SEVERAL else [{"name": "", "projection": "", **meta}]
+        members = [
+            _Member(
+                str(one["name"]),
+                str(one["projection"]),
+                DictionaryOptions(**one["training"]),
+                Quality(**one["quality"]),
+            )
+            for one in told
+        ]
+        check_names([member.name for member in members])
+    except (KeyError, TypeError) as error:
+        raise VisionError(f"its meta is incomplete ({error})") from error
+    for member in members:
+        if not all(isinstance(value, int | float) for value in asdict(member.quality).values()):
+            raise VisionError("its meta holds a quality that is not a number")
+    return members
+
+
+def check_names(names: Sequence[str]) -> None:
+    """VisionError unless the first of a set's dictionaries has no name, and the others names like `pn10`."""
+    if not names or names[0]:
+        raise VisionError("the first dictionary of a set has no name")
+    for number, name in enumerate(names[1:], start=1):
+        if not _NAME.fullmatch(name):
+            raise VisionError(f"a dictionary cannot be called {name!r}; small letters and a number are a name")
+        if name in names[:number]:
+            raise VisionError(f"two dictionaries are called {name}")
+
+
+def _more_arrays(meta: dict[str, Any]) -> list[str]:
+    return [name for member in _members(meta) for name in member.arrays().values()]
+
+
+def _restored(arrays: Arrays, meta: dict[str, Any]) -> tuple[Dictionary, ...]:
+    members = _members(meta)
+    try:
+        spec = DescriptorSpec(**meta["descriptor"])
         sequences = tuple(map(str, meta.get("sequences", ())))
     except (KeyError, TypeError) as error:
         raise VisionError(f"its meta is incomplete ({error})") from error
-    if not all(isinstance(value, int | float) for value in asdict(quality).values()):
-        raise VisionError("its meta holds a quality that is not a number")
-    _check_arrays(arrays, {"d": spec.length, "k": arrays["variances"].size, "K": training.size**2})
-    pca = Pca(arrays["mean"], arrays["components"], arrays["variances"], quality.explained, quality.needed)
-    return Dictionary(spec, pca, arrays["codebook"], arrays["hits"], training, quality, sequences)
+    projections: dict[str, Pca] = {}
+    dictionaries = []
+    for member in members:
+        names = member.arrays()
+        mine = {name: arrays[stored] for name, stored in names.items()}
+        lengths = {"d": spec.length, "k": mine["variances"].size, "K": member.training.size**2}
+        _check_arrays(mine, lengths, names)
+        quality = member.quality
+        pca = Pca(mine["mean"], mine["components"], mine["variances"], quality.explained, quality.needed)
+        pca = projections.setdefault(member.projection, pca)
+        of_map = mine["codebook"], mine["hits"]
+        dictionaries.append(Dictionary(spec, pca, *of_map, member.training, quality, sequences, name=member.name))
+    return tuple(dictionaries)
 
 
-def _check_arrays(arrays: Arrays, lengths: dict[str, int]) -> None:
+def _check_arrays(arrays: Arrays, lengths: dict[str, int], names: dict[str, str]) -> None:
     for name, (dtype, axes) in _ARRAYS.items():
         array, shape = arrays[name], tuple(lengths[axis] for axis in axes)
         if array.dtype != dtype or array.shape != shape:
             raise VisionError(
-                f"{name} is {array.dtype} {array.shape}, not {np.dtype(dtype)} {shape}, as its meta tells"
+                f"{names[name]} is {array.dtype} {array.shape}, not {np.dtype(dtype)} {shape}, as its meta tells"
             )
         if not np.isfinite(array).all():
-            raise VisionError(f"{name} holds NaN or infinite values")
+            raise VisionError(f"{names[name]} holds NaN or infinite values")
     if arrays["hits"].min() < 0 or not arrays["hits"].any():
-        raise VisionError("hits holds no counts of frames")
+        raise VisionError(f"{names['hits']} holds no counts of frames")

@@ -13,7 +13,9 @@ from placerec.jobs import Executor, Progress
 from placerec.journal import open_journal
 from placerec.vision.chunks import Source
 from placerec.vision.describe import describe, keep_described, save_descriptors
-from placerec.vision.dictionary import Dictionary, DictionaryOptions, Quality
+from placerec.vision.dictionary import Dictionary
+from placerec.vision.learning import Quality
+from placerec.vision.options import DictionaryOptions
 from placerec.vision.som import MapQuality
 from placerec.vision.spec import DescriptorSpec
 

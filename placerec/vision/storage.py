@@ -4,7 +4,7 @@ import hashlib
 import json
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
@@ -58,8 +58,10 @@ def write_npz(path: Path, arrays: Mapping[str, NDArray[Any] | StreamedArray], me
                     np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=False)
 
 
-def read_npz(path: Path, names: tuple[str, ...]) -> tuple[Arrays, dict[str, Any]]:
-    """The arrays called `names` and `meta`; nothing in the file is executed.
+def read_npz(
+    path: Path, names: Iterable[str], more: Callable[[dict[str, Any]], Iterable[str]] = lambda meta: ()
+) -> tuple[Arrays, dict[str, Any]]:
+    """The arrays called `names`, those that `more` names of the `meta`, and `meta`; nothing in the file is executed.
 
     Raises VisionError without the file's name for anything that `write_npz` would not have written.
     """
@@ -69,14 +71,20 @@ def read_npz(path: Path, names: tuple[str, ...]) -> tuple[Arrays, dict[str, Any]
         if damaged is not None:
             raise VisionError(f"the checksum of {damaged} is wrong")
         with np.load(path, allow_pickle=False) as file:
-            missing = [name for name in (*names, "meta") if name not in file.files]
-            if missing:
-                raise VisionError(f"the array {missing[0]} is missing")
-            arrays = {name: file[name] for name in names}
+            _check_there(file.files, (*names, "meta"))
             meta = json.loads(str(file["meta"]))
-    if not isinstance(meta, dict):
-        raise VisionError("its meta is not a JSON object")
+            if not isinstance(meta, dict):
+                raise VisionError("its meta is not a JSON object")
+            names = dict.fromkeys((*names, *more(meta)))
+            _check_there(file.files, names)
+            arrays = {name: file[name] for name in names}
     return arrays, meta
+
+
+def _check_there(there: Iterable[str], wanted: Iterable[str]) -> None:
+    missing = [name for name in wanted if name not in there]
+    if missing:
+        raise VisionError(f"the array {missing[0]} is missing")
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from placerec.errors import OutputError, VisionError
 from placerec.frames.table import FrameTable
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions, descriptor
 from placerec.vision.chunks import CHUNK, Source
-from placerec.vision.dictionary import Quality
+from placerec.vision.learning import Quality
 
 SPEC = DescriptorSpec()
 Content = dict[str, Any]
@@ -324,7 +324,7 @@ def with_array(name: str, change: Callable[[NDArray[Any]], Any]) -> Callable[[Co
         (without("codebook"), "the array codebook is missing"),
         (without("meta"), "the array meta is missing"),
         (with_meta(format="other"), "it is not a dictionary of placerec"),
-        (with_meta(version=2), "it has format version 2, and this placerec reads 1"),
+        (with_meta(version=3), "it has format version 3, and this placerec reads 1 and 2"),
         (with_meta(descriptor={"variant": "x"}), "no GIST variant is called 'x'"),
         (with_meta(training={"colour": 1}), "its meta is incomplete"),
         (with_meta(quality={}), "its meta is incomplete"),

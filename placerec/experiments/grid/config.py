@@ -34,7 +34,7 @@ from placerec.hohmm import PER
 from placerec.lm import SMOOTHINGS
 from placerec.model.decoding import NAMED, STAY
 from placerec.model.options import MAX_ORDER
-from placerec.vision.dictionary import UNITS
+from placerec.vision.options import UNITS
 from placerec.words import parse_selection
 
 

@@ -1,0 +1,129 @@
+"""Several dictionaries of the same descriptors, learned together and kept in one words.npz."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from placerec.arrays import Ints, Singles
+from placerec.errors import VisionError
+from placerec.frames.sequence import Gray
+from placerec.jobs import Executor
+from placerec.vision.chunks import Source, spooled
+from placerec.vision.describe import Descriptors
+from placerec.vision.dictionary import (
+    Dictionary,
+    check_names,
+    read_dictionaries,
+    rows_to_look_up,
+    write_dictionaries,
+)
+from placerec.vision.learning import learn_map, training_rows
+from placerec.vision.options import DictionarySetOptions
+from placerec.vision.pca import fit_pca, moments, project, projected
+from placerec.vision.som import EpochProgress, MapQuality
+from placerec.vision.spec import DescriptorSpec, descriptor
+
+
+@dataclass(frozen=True, eq=False)
+class DictionarySet:
+    """Dictionaries of one kind of descriptors; the first has no name, the others are named by view and size: `pn20`.
+
+    Raises VisionError for other names, and for dictionaries of several kinds of descriptors.
+    """
+
+    dictionaries: tuple[Dictionary, ...]
+
+    def __post_init__(self) -> None:
+        check_names(self.names)
+        if any(one.spec != self.spec for one in self.dictionaries):
+            raise VisionError("dictionaries of several kinds of descriptors are no set")
+
+    @classmethod
+    def of(cls, dictionary: "Dictionary | DictionarySet") -> "DictionarySet":
+        """The set as it is, or that of one dictionary."""
+        return cls((replace(dictionary, name=""),)) if isinstance(dictionary, Dictionary) else dictionary
+
+    @classmethod
+    def fit(
+        cls,
+        descriptors: Source,
+        *,
+        spec: DescriptorSpec,
+        places: Sequence[str] | None = None,
+        options: DictionarySetOptions = DictionarySetOptions(),
+        progress: EpochProgress | None = None,
+        work: Executor | None = None,
+    ) -> "DictionarySet":
+        """Learn a dictionary for every view and size from descriptors (n, spec.length) in time order.
+
+        `places`: the label of each row, "" where there is none. A map of the view `plain` is the one that
+        `Dictionary.fit` learns with that size and seed, which tells of `descriptors`, `progress` (called for one map
+        after the other) and `work`. Raises VisionError for unusable descriptors.
+        """
+        rows = training_rows(descriptors, spec, options.of_map(options.sizes[0]))
+        pca = fit_pca(moments(rows.source, work), options.components)
+        made: list[Dictionary] = []
+        with spooled(projected(rows.source, pca), work) as codes:
+            for size in options.sizes:
+                name = f"plain{size}" if made else ""
+                of_map = options.of_map(size)
+                som, quality = learn_map(codes, pca, rows, of_map, progress)
+                made.append(Dictionary(spec, pca, som.codebook, som.hits, of_map, quality, name=name))
+        return cls(tuple(made))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the dictionaries, "" that of the first."""
+        return tuple(one.name for one in self.dictionaries)
+
+    @property
+    def spec(self) -> DescriptorSpec:
+        """What the descriptors are."""
+        return self.dictionaries[0].spec
+
+    @property
+    def sequences(self) -> tuple[str, ...]:
+        """The names of the recordings that trained the dictionaries, as far as they are known."""
+        return self.dictionaries[0].sequences
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of all that decides which words a frame gets, 64 hexadecimal digits; one dictionary's is its own."""
+        if len(self.dictionaries) == 1:
+            return self.dictionaries[0].fingerprint
+        of_each = "".join(f"{one.name} {one.fingerprint}\n" for one in self.dictionaries)
+        return hashlib.sha256(of_each.encode()).hexdigest()
+
+    def words(self, descriptors: Singles | Descriptors) -> tuple[tuple[Ints, Singles], ...]:
+        """For every dictionary the units int64 (n,) and distances float32 (n,) that `Dictionary.words` gives."""
+        rows = rows_to_look_up(descriptors, self.spec)
+        codes: dict[int, Singles] = {}
+        found = []
+        for one in self.dictionaries:
+            if id(one.pca) not in codes:
+                codes[id(one.pca)] = project(rows, one.pca)
+            found.append(one.words_at(codes[id(one.pca)]))
+        return tuple(found)
+
+    def words_of(self, image: Gray) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """The words of one grey image (h, w) of 0..255, one for every dictionary, and the distances from their units.
+
+        Raises VisionError for an image that cannot be used.
+        """
+        found = self.words(descriptor(image, self.spec)[None])
+        words = (one.vocabulary[int(units[0])] for one, (units, _) in zip(self.dictionaries, found, strict=True))
+        return tuple(words), tuple(float(distances[0]) for _, distances in found)
+
+    def quality_of(self, descriptors: Singles | Descriptors) -> tuple[MapQuality, ...]:
+        """How well each map represents these frames, for instance of recordings that trained nothing."""
+        return tuple(one.quality_of(descriptors) for one in self.dictionaries)
+
+    def save(self, path: Path | str) -> None:
+        """Write words.npz; a set of one dictionary is the file that `Dictionary.save` writes."""
+        write_dictionaries(Path(path), self.dictionaries)
+
+    @classmethod
+    def load(cls, path: Path | str) -> "DictionarySet":
+        """Read and check a words.npz of one dictionary or of several; VisionError as `Dictionary.load` says."""
+        return cls(read_dictionaries(Path(path)))
