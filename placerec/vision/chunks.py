@@ -51,15 +51,16 @@ def first_unusable(rows: Singles) -> int | None:
 class SpooledRows:
     """The chunks of a source, kept for any number of passes; as a stream, too.
 
-    `each` maps functions over them; workers on other machines have copies of their own. `rows`: how many there are.
+    `each` maps functions over them; workers on other machines have copies of their own. There are `rows` of `width`
+    values.
     """
 
     def __init__(self, file: IO[bytes], source: Source, work: Executor | None) -> None:
         self._file = file
-        self._count, self._width, self.rows = 0, 0, 0
+        self._count, self.width, self.rows = 0, 0, 0
         for rows in chunks(source):
             file.write(rows.astype(np.float32, copy=False).tobytes())
-            self._count, self._width = self._count + 1, rows.shape[1]
+            self._count, self.width = self._count + 1, rows.shape[1]
             self.rows += len(rows)
         self.each: ScatteredMap[Singles] = scatter(self, work)
 
@@ -67,9 +68,9 @@ class SpooledRows:
         return self._count
 
     def __getitem__(self, at: int) -> Singles:
-        size = 4 * self._width * CHUNK
+        size = 4 * self.width * CHUNK
         self._file.seek(at * size)
-        return np.frombuffer(self._file.read(size), np.float32).reshape(-1, self._width)
+        return np.frombuffer(self._file.read(size), np.float32).reshape(-1, self.width)
 
     def __call__(self) -> Iterator[Singles]:
         return map(self.__getitem__, range(len(self)))

@@ -1,6 +1,7 @@
 """Several dictionaries of the same descriptors, learned together and kept in one words.npz."""
 
 import hashlib
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from placerec.arrays import Ints, Singles
 from placerec.errors import VisionError
 from placerec.frames.sequence import Gray
 from placerec.jobs import Executor
-from placerec.vision.chunks import Source, spooled
+from placerec.vision.chunks import Source, SpooledRows, spooled
 from placerec.vision.describe import Descriptors
 from placerec.vision.dictionary import (
     Dictionary,
@@ -18,11 +19,14 @@ from placerec.vision.dictionary import (
     rows_to_look_up,
     write_dictionaries,
 )
-from placerec.vision.learning import learn_map, training_rows
+from placerec.vision.learning import TrainingRows, learn_map, training_rows
 from placerec.vision.options import DictionarySetOptions
-from placerec.vision.pca import fit_pca, moments, project, projected
+from placerec.vision.pca import Pca, fit_pca, moments, project, projected
 from placerec.vision.som import EpochProgress, MapQuality
 from placerec.vision.spec import DescriptorSpec, descriptor
+from placerec.vision.views import place_normalised, place_numbers
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +63,34 @@ class DictionarySet:
 
         `places`: the label of each row, "" where there is none. A map of the view `plain` is the one that
         `Dictionary.fit` learns with that size and seed, which tells of `descriptors`, `progress` (called for one map
-        after the other) and `work`. Raises VisionError for unusable descriptors.
+        after the other) and `work`. Descriptors without a label train maps, but not the view `pn`, which is left out
+        with a warning where fewer than two places are labelled. Raises VisionError for unusable descriptors, and if
+        no view is left.
         """
         rows = training_rows(descriptors, spec, options.of_map(options.sizes[0]))
         pca = fit_pca(moments(rows.source, work), options.components)
-        made: list[Dictionary] = []
-        with spooled(projected(rows.source, pca), work) as codes:
-            for size in options.sizes:
-                name = f"plain{size}" if made else ""
-                of_map = options.of_map(size)
+
+        def learned(codes: SpooledRows, pca: Pca) -> list[Dictionary]:
+            made = []
+            for of_map in map(options.of_map, options.sizes):
                 som, quality = learn_map(codes, pca, rows, of_map, progress)
-                made.append(Dictionary(spec, pca, som.codebook, som.hits, of_map, quality, name=name))
-        return cls(tuple(made))
+                made.append(Dictionary(spec, pca, som.codebook, som.hits, of_map, quality))
+            return made
+
+        of_view: dict[str, list[Dictionary]] = {}
+        normalised = None
+        # A fifth of the descriptors, for many passes.
+        with spooled(projected(rows.source, pca), work) as codes:
+            if "plain" in options.views:
+                of_view["plain"] = learned(codes, pca)
+            if "pn" in options.views:
+                normalised = _normalised(pca, codes, rows, places, options, work)
+        if normalised is not None:
+            with spooled(projected(rows.source, normalised), work) as codes:
+                of_view["pn"] = learned(codes, normalised)
+        made = [(view, one) for view in options.views for one in of_view.get(view, ())]
+        others = (replace(one, name=f"{view}{one.training.size}") for view, one in made[1:])
+        return cls((made[0][1], *others))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,3 +147,24 @@ class DictionarySet:
     def load(cls, path: Path | str) -> "DictionarySet":
         """Read and check a words.npz of one dictionary or of several; VisionError as `Dictionary.load` says."""
         return cls(read_dictionaries(Path(path)))
+
+
+def _normalised(
+    pca: Pca,
+    codes: SpooledRows,
+    rows: TrainingRows,
+    places: Sequence[str] | None,
+    options: DictionarySetOptions,
+    work: Executor | None,
+) -> Pca | None:
+    """The place-normalised projection; None, and a warning, if the labels do not give one and another view is left."""
+    numbers = place_numbers(places, codes.rows if rows.kept is None else len(rows.kept))
+    try:
+        return place_normalised(pca, codes, numbers if rows.kept is None else numbers[rows.kept], work)
+    except VisionError as error:
+        if options.views == ("pn",):
+            raise VisionError(
+                f"the view pn cannot be learned: {error}; label more frames, or choose --views plain"
+            ) from error
+        log.warning("the view pn is left out: %s", error)
+        return None

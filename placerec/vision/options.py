@@ -8,7 +8,7 @@ from placerec.errors import VisionError
 from placerec.vision.som import RULES, WIDTH
 
 UNITS = ("live", "all")
-VIEWS = ("plain",)
+VIEWS = ("plain", "pn")
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,12 @@ class DictionaryOptions:
 class DictionarySetOptions:
     """How a set of dictionaries is learned: one for every view and size, the views outermost.
 
-    `views`: `plain`, the principal components. `sizes`: the sides of the maps. The other options are those of
-    `DictionaryOptions`, and every map's. Raises VisionError for a value that cannot be used.
+    `views`: `plain`, the principal components, and `pn`, place-normalised (`views.place_normalised`). `sizes`: the
+    sides of the maps. The other options are those of `DictionaryOptions`, and every map's. Raises VisionError for a
+    value that cannot be used.
     """
 
-    views: tuple[str, ...] = ("plain",)
+    views: tuple[str, ...] = VIEWS
     sizes: tuple[int, ...] = (10, 20)
     components: int = 80
     seed: int = 0

@@ -59,9 +59,14 @@ class Pca:
     needed: int
 
     @cached_property
+    def scale(self) -> Floats:
+        """Per component (k,) the power of two that its entries are within."""
+        return np.ldexp(1.0, exact.exponents(self.components)[:, 0])
+
+    @cached_property
     def grid(self) -> Floats:
-        """The components as `exact.product` takes them, (d, k)."""
-        return self.components.T.astype(np.float64)
+        """The components over their `scale`, as `exact.product` takes them, (d, k)."""
+        return self.components.T / self.scale
 
 
 def moments(source: Source, work: Executor | None = None) -> Moments:
@@ -95,8 +100,7 @@ def fit_pca(data: Moments, components: int = 80) -> Pca:
         log.warning("PCA keeps %d components instead of %d: the %d descriptors have no more", k, components, data.n)
     share = np.cumsum(values) / values.sum()
     leading = vectors[:k]
-    largest = np.take_along_axis(leading, np.abs(leading).argmax(axis=1)[:, None], axis=1)
-    leading = exact.on_grid(leading * np.sign(largest))
+    leading = exact.on_grid(with_signs(leading))
     explained = round(float(share[k - 1]), 9)
     if explained < PROMISED:
         log.warning("the %d components of the PCA keep %.1f %% of the variance", k, 100 * explained)
@@ -104,12 +108,19 @@ def fit_pca(data: Moments, components: int = 80) -> Pca:
     return Pca(data.mean, leading.astype(np.float32), values[:k].astype(np.float32), explained, needed)
 
 
+def with_signs(components: Floats) -> Floats:
+    """The components (k, d) with such signs that the largest entry of each is positive."""
+    largest = np.take_along_axis(components, np.abs(components).argmax(axis=1)[:, None], axis=1)
+    signed: Floats = components * np.sign(largest)
+    return signed
+
+
 def project(rows: Singles, pca: Pca) -> Singles:
     """Coordinates float32 (n, k) of rows (n, d); a row's do not depend on the other rows."""
     codes = np.empty((len(rows), len(pca.components)), np.float32)
     for first in range(0, len(rows), CHUNK):
         piece = slice(first, first + CHUNK)
-        codes[piece] = exact.product(rows[piece] - pca.mean, pca.grid)
+        codes[piece] = exact.product(rows[piece] - pca.mean, pca.grid) * pca.scale
     return codes
 
 

@@ -109,7 +109,7 @@ class _Share:
 def _share(ready: Units, measured: bool, rows: Singles) -> _Share:
     units = _search(rows, ready)
     count = len(ready.places)
-    sums = _unit_sums(rows, units, count)[np.bincount(units, minlength=count) > 0]
+    sums = group_sums(rows, units, count)[np.bincount(units, minlength=count) > 0]
     distance = float(distances(rows, ready.places, units).sum()) if measured else 0.0
     return _Share(units.astype(np.min_scalar_type(count)), sums, distance)
 
@@ -228,8 +228,8 @@ def _start(mean: Floats, deviation: Floats, size: int, rng: np.random.Generator)
     return codebook
 
 
-def _unit_sums(rows: Singles, units: Ints, count: int) -> Floats:
-    """Per unit the sum (count, k) of its rows, added in their order."""
+def group_sums(rows: Singles, units: Ints, count: int) -> Floats:
+    """Per unit of `count` the sum (count, k) of the rows (n, k) that are its own by `units` (n,), in their order."""
     mine = csc_array((np.ones(len(rows)), units, np.arange(len(rows) + 1)), shape=(count, len(rows)))
     sums: Floats = mine @ rows.astype(np.float64)
     return sums

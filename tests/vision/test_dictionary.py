@@ -144,12 +144,14 @@ def test_streamed_descriptors_are_checked() -> None:
 
 BLAS = """
 import numpy as np
-from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions
+from placerec.vision import DescriptorSpec, DictionarySet, DictionarySetOptions
 from placerec.vision.som import train_som
 rng = np.random.default_rng(0)
 rows = (rng.random((30, 384))[rng.integers(30, size=1500)] + 0.3 * rng.random((1500, 384))).astype(np.float32)
-made = Dictionary.fit(rows, spec=DescriptorSpec(), options=DictionaryOptions(size=12, components=40, epochs=6))
-print(made.fingerprint, made.words(rows[:100] + np.float32(0.01))[1].tobytes().hex())
+options = DictionarySetOptions(sizes=(12,), components=40, epochs=6)
+made = DictionarySet.fit(rows, spec=DescriptorSpec(), places=[str(n % 8) for n in range(1500)], options=options)
+assert made.names == ("", "pn12")
+print(made.fingerprint, [far.tobytes().hex() for _, far in made.words(rows[:100] + np.float32(0.01))])
 online = train_som(rows[:300, :40], 12, rng=rng, rule="online", epochs=1)
 print(online.codebook.tobytes().hex())
 """
