@@ -29,8 +29,26 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
 
 @click.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
 @shared.source_arguments
-@shared.size_option(10)
-@click.option("--components", type=click.IntRange(min=1), default=80, help="Principal components that the map sees.")
+@click.option(
+    "--views",
+    metavar="VIEW,...",
+    callback=shared.listed(click.Choice(["plain", "pn"])),
+    default="plain",
+    help="What maps see: principal components (plain), or these by how little the frames of one place differ (pn).",
+)
+@click.option(
+    "--size",
+    "--sizes",
+    "sizes",
+    metavar="N,...",
+    callback=shared.listed(click.IntRange(2, 200)),
+    default="10",
+    help="Sides of the maps: a dictionary of size x size words for each, in every view.",
+)
+@shared.as_in_paper(
+    "The paper's words: --views plain --size 10; options given beside it win.", views="plain", sizes="10"
+)
+@click.option("--components", type=click.IntRange(min=1), default=80, help="Principal components that a map sees.")
 @shared.seed_option("Another seed, another map.")
 @click.option(
     "--fraction",
@@ -71,7 +89,7 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
 @shared.work_options
 @shared.talk_options
 def train_words(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
-    """Learn visual words: PCA and a map of descriptors.
+    """Learn visual words: PCA and maps of descriptors.
 
     SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
     folder of images (any, or laid out as in COLD, KTH-IDOL2 or VPC), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
@@ -79,9 +97,9 @@ def train_words(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
     """
     from dataclasses import fields
 
-    from placerec.vision import DictionaryOptions, train_dictionary
+    from placerec.vision import DictionarySetOptions, train_dictionary
 
-    options = DictionaryOptions(**{field.name: how.pop(field.name) for field in fields(DictionaryOptions)})
+    options = DictionarySetOptions(**{field.name: how.pop(field.name) for field in fields(DictionarySetOptions)})
     with shared.progress_bar("describe") as progress:
         train_dictionary(sources, out, options=options, progress=progress, **how)
 

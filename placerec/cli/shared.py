@@ -310,6 +310,29 @@ def size_option(default: int) -> Callable[[Command], Command]:
     return click.option("--size", type=click.IntRange(2, 200), default=default, help=text)
 
 
+def listed(item: "click.ParamType[Any]") -> Callable[[click.Context, click.Parameter, str], tuple[Any, ...]]:
+    """A callback that reads values with commas between them, none of them twice, as a tuple."""
+
+    def parse(ctx: click.Context, param: click.Parameter, value: str) -> tuple[Any, ...]:
+        values = tuple(item.convert(each.strip(), param, ctx) for each in value.split(","))
+        twice = [each for number, each in enumerate(values) if each in values[:number]]
+        if twice:
+            raise click.BadParameter(f"{twice[0]} is named twice", ctx, param)
+        return values
+
+    return parse
+
+
+def as_in_paper(text: str, **values: str) -> Callable[[Command], Command]:
+    """--as-in-paper: other defaults for some options, by the names of their parameters; what is given wins."""
+
+    def preset(ctx: click.Context, param: click.Parameter, chosen: bool) -> None:
+        if chosen:
+            ctx.default_map = {**(ctx.default_map or {}), **values}
+
+    return click.option("--as-in-paper", is_flag=True, is_eager=True, expose_value=False, callback=preset, help=text)
+
+
 def seed_option(text: str) -> Callable[[Command], Command]:
     """--seed: 0 or above, 0 by default."""
     return click.option("--seed", type=click.IntRange(min=0), default=0, help=text)

@@ -13,9 +13,9 @@ from placerec.jobs import Executor, Progress
 from placerec.journal import open_journal
 from placerec.vision.chunks import Source
 from placerec.vision.describe import describe, keep_described, save_descriptors
-from placerec.vision.dictionary import Dictionary
+from placerec.vision.dictionary_set import DictionarySet
 from placerec.vision.learning import Quality
-from placerec.vision.options import DictionaryOptions
+from placerec.vision.options import DictionaryOptions, DictionarySetOptions
 from placerec.vision.som import MapQuality
 from placerec.vision.spec import DescriptorSpec
 
@@ -56,16 +56,17 @@ def train_dictionary(
     spec: DescriptorSpec | None = None,
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
-    options: DictionaryOptions = DictionaryOptions(),
+    options: DictionarySetOptions | DictionaryOptions = DictionaryOptions(),
     held_out: Iterable[Path | str] = (),
     work: Executor | None = None,
     progress: Progress | None = None,
-) -> Dictionary:
-    """Describe the frames of the sources, fit a dictionary to them (`Dictionary.fit`) and write it to `out`.
+) -> DictionarySet:
+    """Describe the frames of the sources, fit dictionaries to them (`DictionarySet.fit`) and write these to `out`.
 
-    `spec`, `matrix`, `work`: see `describe_sources`, which tells of memory and of killed runs, too. `held_out`: sources
-    that train nothing; how well the map represents them (`Dictionary.quality_of`) is noted. `progress` is called
-    with frames described and in all. Raises as `describe_sources` and `Dictionary.fit` do.
+    `spec`, `matrix`, `work`: see `describe_sources`, which tells of memory and of killed runs, too. `options`: those of
+    one map are of a set of one. `held_out`: sources that train nothing; how well the maps represent them
+    (`Dictionary.quality_of`) is noted. `progress` is called with frames described and in all. Raises as
+    `describe_sources` and `DictionarySet.fit` do.
     """
     with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
         training, others = (find_sequences(some, options=source_options) for some in (sources, held_out))
@@ -75,21 +76,23 @@ def train_dictionary(
         values: Source
         if matrix is not None:
             found = describe(training, spec, matrix=matrix)
-            spec, values = found.spec, found.values
+            spec, values, places = found.spec, found.values, found.table.places
         else:
             spec = spec or DescriptorSpec()
             kept = keep_described(training, spec, journal, work, lambda done, _: tell(done, seen + unseen))
-            values = kept.values.pieces
-        dictionary = Dictionary.fit(values, spec=spec, options=options, work=work)
-        dictionary = replace(dictionary, sequences=tuple(sequence.name for sequence in training))
-        dictionary.save(unfinished)
-        _report(dictionary)
+            values, places = kept.values.pieces, kept.table.places
+        chosen = DictionarySetOptions.of(options)
+        made = DictionarySet.fit(values, spec=spec, places=places, options=chosen, work=work)
+        names = tuple(sequence.name for sequence in training)
+        made = DictionarySet(tuple(replace(one, sequences=names) for one in made.dictionaries))
+        made.save(unfinished)
+        _report(made)
         if others:
             more = describe(
                 others, spec, matrix=matrix, work=work, progress=lambda done, _: tell(seen + done, seen + unseen)
             )
-            _report_held_out(dictionary.quality_of(more))
-    return dictionary
+            _report_held_out(made.names, made.quality_of(more))
+    return made
 
 
 def _check_unread(out: Path, sequences: Iterable[Sequence], matrix: Path | str | None) -> None:
@@ -101,30 +104,36 @@ def _check_unread(out: Path, sequences: Iterable[Sequence], matrix: Path | str |
         raise OutputError(f"{out}: is read, and would be written over; name another output")
 
 
-def _report(dictionary: Dictionary) -> None:
-    quality = dictionary.quality
+def _report(made: DictionarySet) -> None:
+    first, *others = made.dictionaries
+    quality = first.quality
     log.info(
         "%d words, %d of them never seen, from %d of %d frames; %d components keep %.1f %% of the variance (%d would "
         "keep 99 %%); after %d epochs %s",
-        len(dictionary.hits),
-        dictionary.dead,
+        len(first.hits),
+        first.dead,
         quality.used,
         quality.frames,
-        len(dictionary.pca.components),
+        len(first.pca.components),
         100 * quality.explained,
         quality.needed,
         quality.epochs,
         _errors(quality),
     )
+    for one in others:
+        words = f"{len(one.hits)} words, {one.dead} of them never seen"
+        log.info("%s: %s; after %d epochs %s", one.name, words, one.quality.epochs, _errors(one.quality))
 
 
-def _report_held_out(quality: MapQuality) -> None:
-    log.info(
-        "held out: %d frames, %.1f %% of them on words that training never saw; %s",
-        quality.frames,
-        100 * quality.unseen,
-        _errors(quality),
-    )
+def _report_held_out(names: Iterable[str], qualities: Iterable[MapQuality]) -> None:
+    for name, quality in zip(names, qualities, strict=True):
+        log.info(
+            "held out%s: %d frames, %.1f %% of them on words that training never saw; %s",
+            f", {name}" if name else "",
+            quality.frames,
+            100 * quality.unseen,
+            _errors(quality),
+        )
 
 
 def _errors(quality: Quality | MapQuality) -> str:

@@ -86,7 +86,7 @@ def place_normalised(pca: Pca, codes: SpooledRows, places: Ints, work: Executor 
     if np.trace(found.covariance) <= np.finfo(np.float32).eps * pca.variances.sum(dtype=np.float64):
         raise VisionError("it needs places with frames that differ, and all that are labelled are like their place's")
     log.info(
-        "pn: %d frames of %d places about their means, their covariance shrunk by %.3f",
+        "view pn: from %d labelled frames of %d places, their covariance shrunk by %.2f",
         found.n,
         found.places,
         found.shrinkage(),

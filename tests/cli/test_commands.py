@@ -68,7 +68,7 @@ def test_every_command_helps(name: str) -> None:
     for param in command.params:
         if isinstance(param, click.Option):
             assert param.help, f"{param.opts} is not explained"
-            shown = re.split(rf"^  (?:-\w, )?{param.opts[-1]}\b", text, flags=re.MULTILINE)[1].partition("\n  -")[0]
+            shown = re.split(rf"^  (?:-+\w+, )?{param.opts[-1]}\b", text, flags=re.MULTILINE)[1].partition("\n  -")[0]
             told = "default: " in " ".join(shown.split()) or param.required or param.is_flag
             assert told or not isinstance(param.default, int | float | str), f"the default of {param.opts} is not shown"
 

@@ -218,7 +218,7 @@ def test_a_dictionary_of_a_matrix(runs: list[Sequence], tmp_path: Path) -> None:
     )
     loaded = Dictionary.load(tmp_path / "w.npz")
     assert loaded.spec == DescriptorSpec(kind="npy", columns=5)
-    np.testing.assert_array_equal(loaded.words(features())[0], made.words(features())[0])
+    np.testing.assert_array_equal(loaded.words(features())[0], made.dictionaries[0].words(features())[0])
     assert str(tmp_path).encode() not in (tmp_path / "w.npz").read_bytes()
     with pytest.raises(VisionError, match="the descriptors have 6 values, and the dictionary's have 5"):
         loaded.words(features(d=6))
