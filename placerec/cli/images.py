@@ -128,6 +128,7 @@ def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> N
 @click.command("show-words", epilog="Example: placerec show-words words.npz RUNS/ -o words.png")
 @click.argument("words", metavar="words.npz", type=shared.FILE)
 @shared.source_arguments
+@shared.dictionary_option
 @shared.matrix_option
 @shared.output_option("words.png", "Draw all words on one sheet: .png, .svg or .pdf.", required=False)
 @shared.json_option("Print JSON, with a row for every unit of the map.")
@@ -152,6 +153,7 @@ def show_words(words: Path, sources: tuple[Path, ...], out: Path | None, as_json
 @click.argument("sources", metavar="[SOURCE...]", nargs=-1, type=shared.PATH)
 @shared.reading_options()
 @shared.words_option(True, "The dictionary of train-words.")
+@shared.dictionary_option
 @shared.output_option("seen.png", "Draw what the descriptor sees: .png, .svg or .pdf.", required=False)
 @shared.json_option()
 @shared.talk_options
@@ -174,6 +176,7 @@ def show_frame(
 @click.command(epilog="Example: placerec stability RUNS/ -w words.npz -o stability.png")
 @shared.source_arguments
 @shared.words_option(True, "The dictionary of train-words.")
+@shared.dictionary_option
 @shared.seed_option("Seed of the noise.")
 @shared.output_option("stability.png", "Draw the table as bars: .png, .svg or .pdf.", required=False)
 @shared.json_option()

@@ -343,6 +343,14 @@ def words_option(required: bool, text: str) -> Callable[[Command], Command]:
     return click.option("-w", "--words", metavar="words.npz", type=PATH, required=required, help=text)
 
 
+def dictionary_option(function: Command) -> Command:
+    """--dictionary: one of the file's. The command gets `name`."""
+    text = "Which dictionary, if train-words learned several: pn20, for instance.  [default: the first]"
+    return click.option(
+        "--dictionary", "name", metavar="NAME", callback=lambda ctx, param, value: value or "", help=text
+    )(function)
+
+
 def output_option(metavar: str, text: str, required: bool = True) -> Callable[[Command], Command]:
     """-o: the output, replaced whole if it exists; a folder if `metavar` ends in a slash, else a file."""
     path = PATH if metavar.endswith("/") else FILE

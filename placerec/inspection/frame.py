@@ -15,7 +15,7 @@ from placerec.frames import Sequence, SourceOptions, read_gray
 from placerec.frames.sequence import Gray
 from placerec.inspection.words import WordTable, look_up, typical_images
 from placerec.jobs import Progress
-from placerec.vision import DescriptorSpec, Dictionary, descriptor, fit_image
+from placerec.vision import DescriptorSpec, Dictionary, DictionarySet, descriptor, fit_image
 from placerec.vision.pca import project
 
 if TYPE_CHECKING:
@@ -75,17 +75,19 @@ def show_frame(
     sources: Iterable[Path | str] = (),
     out: Path | str | None = None,
     *,
+    name: str = "",
     source_options: SourceOptions = SourceOptions(),
     progress: Progress | None = None,
 ) -> FrameView:
     """`placerec show-frame`: what a words.npz sees in an image, and which units are nearest to it.
 
     `sources`: sequences whose frames tell what the units look like and which places they belong to. `out`: the
-    picture to draw, PNG, SVG or PDF by suffix. Raises SourceError and VisionError for what cannot be read, OutputError
-    for a picture that cannot be written, MissingExtraError without matplotlib.
+    picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first. Raises
+    SourceError and VisionError for what cannot be read, OutputError for a picture that cannot be written,
+    MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
-        dictionary = Dictionary.load(words)
+        dictionary = DictionarySet.load(words).named(name)
         view = view_frame(image, dictionary)
         sequences: list[Sequence] = []
         if sources := list(sources):

@@ -16,7 +16,7 @@ from placerec.frames import SourceOptions
 from placerec.frames.sequence import Gray
 from placerec.inspection.words import WordTable, look_up, typical_images, word_sentences
 from placerec.jobs import Progress
-from placerec.vision import Dictionary
+from placerec.vision import DictionarySet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,18 +58,20 @@ def show_words(
     sources: Iterable[Path | str],
     out: Path | str | None = None,
     *,
+    name: str = "",
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     progress: Progress | None = None,
 ) -> WordTable:
     """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
 
-    `out`: the picture to draw, PNG, SVG or PDF by suffix. `matrix`: the frames' descriptors, for a dictionary of
-    descriptors that were computed elsewhere (`describe`). Raises SourceError and VisionError for what cannot be read,
-    OutputError for a picture that cannot be written, MissingExtraError without matplotlib.
+    `out`: the picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first.
+    `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed elsewhere (`describe`).
+    Raises SourceError and VisionError for what cannot be read, OutputError for a picture that cannot be written,
+    MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
-        dictionary = Dictionary.load(words)
+        dictionary = DictionarySet.load(words).named(name)
         table, sequences = look_up(sources, dictionary, source_options, progress, matrix)
         if picture is not None:
             images = typical_images(table, sequences)

@@ -19,7 +19,7 @@ from placerec.figures.canvas import figure_file, picture_file
 from placerec.frames import Frame, Sequence, SourceOptions, all_images, find_sequences
 from placerec.frames.sequence import Gray
 from placerec.jobs import Progress
-from placerec.vision import Dictionary
+from placerec.vision import Dictionary, DictionarySet
 from placerec.vision.spec import DescriptorSpec, describer, descriptor
 
 log = logging.getLogger(__name__)
@@ -87,17 +87,19 @@ def stability(
     words: Path | str,
     out: Path | str | None = None,
     *,
+    name: str = "",
     source_options: SourceOptions = SourceOptions(),
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Stability:
     """`placerec stability`: how many frames of the sources get another word by what a camera does to pictures.
 
-    `out`: the picture to draw, PNG, SVG or PDF by suffix. `seed`: of the noise. Raises SourceError and VisionError for
-    what cannot be read, OutputError for a picture that cannot be written, MissingExtraError without matplotlib.
+    `out`: the picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first.
+    `seed`: of the noise. Raises SourceError and VisionError for what cannot be read, OutputError for a picture that
+    cannot be written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
-        dictionary = Dictionary.load(words)
+        dictionary = DictionarySet.load(words).named(name)
         found = word_changes(find_sequences(sources, options=source_options), dictionary, seed=seed, progress=progress)
         if picture is not None:
             plot_stability(found, picture)

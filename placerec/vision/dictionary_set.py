@@ -97,6 +97,13 @@ class DictionarySet:
         """The names of the dictionaries, "" that of the first."""
         return tuple(one.name for one in self.dictionaries)
 
+    def named(self, name: str) -> Dictionary:
+        """The dictionary of a name, "" for the first; VisionError that lists the names if there is no such one."""
+        if name not in self.names:
+            named = ", ".join(self.names[1:]) or "no other dictionary"
+            raise VisionError(f"no dictionary is called {name!r}; there is the first, without a name, and {named}")
+        return self.dictionaries[self.names.index(name)]
+
     @property
     def spec(self) -> DescriptorSpec:
         """What the descriptors are."""

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 from helpers.small_world import write_images
-from helpers.typed_commands import placerec
+from helpers.typed_commands import fails, placerec
 
+from placerec.frames import read_gray
 from placerec.inspection.word_stability import CHANGES
-from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
+from placerec.vision import DescriptorSpec, DictionaryOptions, DictionarySet, DictionarySetOptions, train_dictionary
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +21,39 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
         [root / "runs/seq1"], root / "words.npz", spec=DescriptorSpec(image_size=16), options=DictionaryOptions(size=3)
     )
     return root
+
+
+@pytest.fixture(scope="module")
+def several(world: Path) -> Path:
+    """A words.npz of four dictionaries."""
+    spec, options = DescriptorSpec(image_size=16), DictionarySetOptions(sizes=(3, 4))
+    train_dictionary([world / "runs/seq1"], world / "several.npz", spec=spec, options=options)
+    return world / "several.npz"
+
+
+@pytest.mark.parametrize(("name", "size"), [("", 3), ("plain4", 4), ("pn3", 3)])
+def test_each_of_several_dictionaries_can_be_looked_at(world: Path, several: Path, name: str, size: int) -> None:
+    which = ("--dictionary", name, "--json", "-q") if name else ("--json", "-q")
+    start = f"{name}.w" if name else "w"
+    dictionary = DictionarySet.load(several).named(name)
+    sheet = json.loads(placerec("show-words", several, world / "runs", *which).stdout)
+    assert [unit["word"] for unit in sheet["units"]] == list(dictionary.vocabulary)
+    assert len(sheet["units"]) == size**2
+    seen = json.loads(placerec("show-frame", image(world), "-w", several, *which).stdout)
+    assert seen["word"] == dictionary.word_of(read_gray(image(world)))[0]
+    assert seen["word"].startswith(start)
+    frames = json.loads(placerec("stability", world / "runs/seq2", "-w", several, *which).stdout)
+    dictionary.save(world / "alone.npz")
+    assert frames == json.loads(
+        placerec("stability", world / "runs/seq2", "-w", world / "alone.npz", *which[-2:]).stdout
+    )
+
+
+def test_a_dictionary_that_is_not_there_is_refused(world: Path, several: Path) -> None:
+    message = "no dictionary is called 'pn9'; there is the first, without a name, and plain4, pn3, pn4"
+    fails(message, "show-words", several, world / "runs", "--dictionary", "pn9")
+    alone = "no dictionary is called 'pn9'; there is the first, without a name, and no other dictionary"
+    fails(alone, "stability", world / "runs", "-w", world / "words.npz", "--dictionary", "pn9")
 
 
 def image(world: Path) -> Path:
