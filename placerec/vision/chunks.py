@@ -42,9 +42,9 @@ def chunks(source: Source) -> Iterator[Singles]:
 def first_unusable(rows: Singles) -> int | None:
     """The first row that holds NaN or infinite values, None if there is none."""
     for number, part in enumerate(chunks(rows)):
-        good = np.isfinite(part).all(axis=1)
+        good = np.isfinite(part)
         if not good.all():
-            return number * CHUNK + int(good.argmin())
+            return number * CHUNK + int(good.all(axis=1).argmin())
     return None
 
 

@@ -17,7 +17,8 @@ from placerec.jobs import Executor
 from placerec.version import __version__
 from placerec.vision.chunks import Source, spooled
 from placerec.vision.describe import Descriptors
-from placerec.vision.learning import Quality, checked_rows, learn_map, training_rows
+from placerec.vision.learning import Quality, checked_rows, learn_map, training_rows, warn_of_few
+from placerec.vision.lookup import Lookup
 from placerec.vision.options import DictionaryOptions
 from placerec.vision.pca import Pca, fit_pca, moments, project, projected
 from placerec.vision.som import EpochProgress, MapQuality, Units, map_quality, nearest_units
@@ -79,6 +80,7 @@ class Dictionary:
         pca = fit_pca(moments(rows.source, work), options.components)
         # A fifth of the descriptors, for many passes.
         with spooled(projected(rows.source, pca), work) as codes:
+            warn_of_few(codes.rows, options.size)
             som, quality = learn_map(codes, pca, rows, options, progress)
         return cls(spec, pca, som.codebook, som.hits, options, quality)
 
@@ -112,15 +114,12 @@ class Dictionary:
         A frame's answer does not depend on the frames around it. Raises VisionError for unusable descriptors, and for
         `Descriptors` of another kind; of what kind a bare array is only its maker can know.
         """
-        return self.words_at(self._codes(descriptors))
-
-    def words_at(self, codes: Singles) -> tuple[Ints, Singles]:
-        """What `words` gives for descriptors that were projected already: coordinates float32 (n, k) in PCA space."""
-        return nearest_units(codes, self._units)
+        return words_in((self,), rows_to_look_up(descriptors, self.spec), self._lookup)[0]
 
     def quality_of(self, descriptors: Singles | Descriptors) -> MapQuality:
         """How well the map represents these frames, for instance of recordings that trained nothing."""
-        return map_quality(self._codes(descriptors), self.codebook, self.hits)
+        codes = project(rows_to_look_up(descriptors, self.spec), self.pca)
+        return map_quality(codes, self.codebook, self.hits)
 
     def word_of(self, image: Gray) -> tuple[str, float]:
         """The word of one grey image (h, w) of 0..255, and its distance from the word's unit in PCA space.
@@ -143,14 +142,28 @@ class Dictionary:
         return dictionaries[0]
 
     @cached_property
-    def _units(self) -> Units:
+    def units(self) -> Units:
+        """The units that may answer, made ready for the search."""
         return Units.of(self.codebook, self.hits > 0 if self.training.units == "live" else None)
 
-    def _codes(self, descriptors: Singles | Descriptors) -> Singles:
-        return project(rows_to_look_up(descriptors, self.spec), self.pca)
+    @cached_property
+    def _lookup(self) -> Lookup | None:
+        return Lookup.of([(self.pca, self.units)])
 
     def _arrays(self) -> Arrays:
         return {**_of_pca(self.pca), "codebook": self.codebook, "hits": self.hits}
+
+
+def words_in(
+    dictionaries: Sequence[Dictionary], rows: Singles, lookup: Lookup | None
+) -> tuple[tuple[Ints, Singles], ...]:
+    """For every dictionary the units and distances of rows (n, d); `lookup`: what is known of them for one row."""
+    alone = lookup.nearest(rows[0]) if lookup is not None and len(rows) == 1 else None
+    if alone is not None:
+        units, distances = alone
+        return tuple((units[at : at + 1], distances[at : at + 1]) for at in range(len(dictionaries)))
+    codes = {id(pca): project(rows, pca) for pca in {id(one.pca): one.pca for one in dictionaries}.values()}
+    return tuple(nearest_units(codes[id(one.pca)], one.units) for one in dictionaries)
 
 
 def rows_to_look_up(descriptors: Singles | Descriptors, spec: DescriptorSpec) -> Singles:

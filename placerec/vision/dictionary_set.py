@@ -4,6 +4,7 @@ import hashlib
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from placerec.arrays import Ints, Singles
@@ -17,11 +18,13 @@ from placerec.vision.dictionary import (
     check_names,
     read_dictionaries,
     rows_to_look_up,
+    words_in,
     write_dictionaries,
 )
-from placerec.vision.learning import TrainingRows, learn_map, training_rows
+from placerec.vision.learning import TrainingRows, learn_map, training_rows, warn_of_few
+from placerec.vision.lookup import Lookup
 from placerec.vision.options import DictionarySetOptions
-from placerec.vision.pca import Pca, fit_pca, moments, project, projected
+from placerec.vision.pca import Pca, fit_pca, moments, projected
 from placerec.vision.som import EpochProgress, MapQuality
 from placerec.vision.spec import DescriptorSpec, descriptor
 from placerec.vision.views import place_normalised, place_numbers
@@ -81,6 +84,7 @@ class DictionarySet:
         normalised = None
         # A fifth of the descriptors, for many passes.
         with spooled(projected(rows.source, pca), work) as codes:
+            warn_of_few(codes.rows, *options.sizes)
             if "plain" in options.views:
                 of_view["plain"] = learned(codes, pca)
             if "pn" in options.views:
@@ -124,14 +128,7 @@ class DictionarySet:
 
     def words(self, descriptors: Singles | Descriptors) -> tuple[tuple[Ints, Singles], ...]:
         """For every dictionary the units int64 (n,) and distances float32 (n,) that `Dictionary.words` gives."""
-        rows = rows_to_look_up(descriptors, self.spec)
-        codes: dict[int, Singles] = {}
-        found = []
-        for one in self.dictionaries:
-            if id(one.pca) not in codes:
-                codes[id(one.pca)] = project(rows, one.pca)
-            found.append(one.words_at(codes[id(one.pca)]))
-        return tuple(found)
+        return words_in(self.dictionaries, rows_to_look_up(descriptors, self.spec), self._lookup)
 
     def words_of(self, image: Gray) -> tuple[tuple[str, ...], tuple[float, ...]]:
         """The words of one grey image (h, w) of 0..255, one for every dictionary, and the distances from their units.
@@ -145,6 +142,10 @@ class DictionarySet:
     def quality_of(self, descriptors: Singles | Descriptors) -> tuple[MapQuality, ...]:
         """How well each map represents these frames, for instance of recordings that trained nothing."""
         return tuple(one.quality_of(descriptors) for one in self.dictionaries)
+
+    @cached_property
+    def _lookup(self) -> Lookup | None:
+        return Lookup.of([(one.pca, one.units) for one in self.dictionaries])
 
     def save(self, path: Path | str) -> None:
         """Write words.npz; a set of one dictionary is the file that `Dictionary.save` writes."""

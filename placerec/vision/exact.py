@@ -5,6 +5,7 @@ words. The order is of no matter where no addition is rounded: the factors are s
 of two that are small enough for float64 to hold every partial sum (the idea of Ozaki's scheme).
 """
 
+import math
 from functools import partial
 
 import numpy as np
@@ -21,11 +22,13 @@ def split(x: Floats, *, axis: int | None = None) -> tuple[Floats, Floats]:
 
     Both are multiples of a power of two, at most 2**20 of them.
     """
-    largest = np.abs(x).max(axis=axis, keepdims=True)
-    exponent = np.frexp(largest)[1]
-    unit = np.ldexp(1.0, exponent - BITS)
+    unit: float | Floats
+    if axis is None:
+        unit = math.ldexp(1, math.frexp(float(np.abs(x).max()))[1] - BITS)
+    else:
+        unit = np.ldexp(1.0, np.frexp(np.abs(x).max(axis=axis, keepdims=True))[1] - BITS)
     coarse = np.rint(x / unit) * unit
-    unit = np.ldexp(1.0, exponent - 2 * BITS)
+    unit = unit / 2**BITS
     return coarse, np.rint((x - coarse) / unit) * unit
 
 
@@ -50,8 +53,11 @@ def gram(x: Floats) -> Floats:
 
 
 def product(x: Floats, grid: Floats) -> Floats:
-    """x @ grid of (n, d) with d <= TERMS and (d, k) from `on_grid`; a row's result is the same in any batch."""
-    coarse, fine = split(x, axis=1)
+    """x @ grid of (n, d) with d <= TERMS and (d, k) from `on_grid`; a row's result is the same in any batch, or alone.
+
+    x may be one row (d,).
+    """
+    coarse, fine = split(x, axis=1 if x.ndim > 1 else None)
     result: Floats = coarse @ grid + fine @ grid
     return result
 

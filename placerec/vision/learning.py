@@ -57,16 +57,20 @@ def training_rows(descriptors: Source, spec: DescriptorSpec, options: Dictionary
     return TrainingRows(_kept(source, kept), kept, rng)
 
 
+def warn_of_few(frames: int, *sizes: int) -> None:
+    """A warning for every size of map that has more units than there are frames to train it."""
+    for size in sizes:
+        if frames < size * size:
+            log.warning("%d frames cannot fill the %d words of a map of size %d", frames, size * size, size)
+
+
 def learn_map(
     codes: SpooledRows, pca: Pca, rows: TrainingRows, options: DictionaryOptions, progress: EpochProgress | None = None
 ) -> tuple[Som, Quality]:
     """Learn a map from the coordinates of the training rows in PCA space."""
-    size, used = options.size, codes.rows
-    if used < size * size:
-        log.warning("%d frames cannot fill the %d words of a map of size %d", used, size * size, size)
     som = train_som(
         codes,
-        size,
+        options.size,
         # Every map of a set begins with the state that a map of its own would.
         rng=deepcopy(rows.rng),
         rule=options.rule,
@@ -76,8 +80,8 @@ def learn_map(
     )
     got = map_quality(codes, som.codebook, som.hits)
     errors = got.quantisation_error, got.topographic_error, got.entropy, got.dead
-    frames = used if rows.kept is None else len(rows.kept)
-    return som, Quality(frames, used, som.epochs, pca.explained, pca.needed, *errors)
+    frames = codes.rows if rows.kept is None else len(rows.kept)
+    return som, Quality(frames, codes.rows, som.epochs, pca.explained, pca.needed, *errors)
 
 
 def _checked_source(descriptors: Source, spec: DescriptorSpec) -> Source:

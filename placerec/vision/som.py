@@ -21,6 +21,7 @@ WIDTH = 0.5  # 1.0 and more gives worse words on small maps, and no later step u
 _RATES = (0.5, 0.01)  # the learning rate of the on-line rule, first and last
 _JITTER = 0.05
 _SETTLED = 0.001  # training ends when a smaller share of the frames changes its unit at the last width
+_EPSILON = float(np.finfo(np.float32).eps)
 _TINY = 1e-290  # below this a neighbourhood's weight has lost its digits to underflow
 
 
@@ -259,6 +260,11 @@ def _search(codes: Singles, units: Units, without: Ints | None = None) -> Ints:
     return found
 
 
+def rounding(columns: int) -> float:
+    """How far float32 scores of that many columns may be from their values, as a share of the largest possible."""
+    return 2 * (columns + 2) * _EPSILON
+
+
 def _search_chunk(codes: Singles, ready: Units, without: Ints | None) -> Ints:
     """float32 products find the candidates; float64 decides where they are nearer to each other than rounding."""
     scores: Singles = codes @ ready.places.T
@@ -269,7 +275,7 @@ def _search_chunk(codes: Singles, ready: Units, without: Ints | None) -> Ints:
     units: Ints = scores.argmax(axis=1)
     best = scores[every, units]
     reach = np.sqrt(np.square(codes, dtype=np.float64).sum(axis=1) * ready.largest) + ready.largest / 2
-    bound = 2 * (codes.shape[1] + 2) * np.finfo(np.float32).eps * reach
+    bound = rounding(codes.shape[1]) * reach
     scores[every, units] = -np.inf
     doubtful = np.flatnonzero(scores.max(axis=1) >= best - bound)
     scores[every, units] = best
