@@ -24,7 +24,14 @@ from placerec.cluster import check_address, cluster
 from placerec.errors import MissingExtraError, StreamError
 from placerec.jobs import JobError, Numbered, RemoteExecutor, ScatteredMap, scatter
 from placerec.model import ModelOptions, train_lm
-from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe_sources, train_dictionary
+from placerec.vision import (
+    DescriptorSpec,
+    Dictionary,
+    DictionaryOptions,
+    DictionarySetOptions,
+    describe_sources,
+    train_dictionary,
+)
 from placerec.words.tokenize import tokenize
 
 pytest.importorskip("distributed", reason="needs the extra: pip install 'placerec[cluster]'")
@@ -177,6 +184,15 @@ def test_train_words(machines: LocalDask, images: Path, tmp_path: Path) -> None:
                 [images], tmp_path / "there.npz", spec=SPEC, options=DictionaryOptions(size=5, epochs=4), work=work
             )
         assert contents(tmp_path / "here.npz") == contents(tmp_path / "there.npz")
+
+
+def test_train_words_of_several_views(machines: LocalDask, images: Path, tmp_path: Path) -> None:
+    options = DictionarySetOptions(sizes=(3, 4), epochs=4)
+    made = train_dictionary([images], tmp_path / "here.npz", spec=SPEC, options=options)
+    assert made.names == ("", "plain4", "pn3", "pn4")
+    with dying(machines, after=40) as work:
+        train_dictionary([images], tmp_path / "there.npz", spec=SPEC, options=options, work=work)
+    assert contents(tmp_path / "here.npz") == contents(tmp_path / "there.npz")
 
 
 def test_tokenize(machines: LocalDask, images: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,10 +11,20 @@ from helpers.small_world import VOCABULARY, run_through, write_images
 from numpy.typing import NDArray
 
 from placerec.frames import find_sequences
+from placerec.frames.table import Labels
 from placerec.jobs import workers
 from placerec.lm import stored_text
 from placerec.model import train_lm
-from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, chunks, describe_sources, train_dictionary
+from placerec.vision import (
+    DescriptorSpec,
+    Dictionary,
+    DictionaryOptions,
+    DictionarySet,
+    DictionarySetOptions,
+    chunks,
+    describe_sources,
+    train_dictionary,
+)
 from placerec.words import write_stream, write_vocabulary
 from placerec.words.tokenize import tokenize
 
@@ -71,17 +81,37 @@ def test_a_folder_is_listed_in_little_memory(world: Path) -> None:
     assert (kept[1] - kept[0]) / (MANY - FEW) < 100
 
 
+def pieces(n: int) -> Callable[[], Iterator[NDArray[np.float32]]]:
+    """Rows of 24 values, a thousand at a time."""
+
+    def give() -> Iterator[NDArray[np.float32]]:
+        for first in range(0, n, 1000):
+            yield np.random.default_rng(first).random((min(1000, n - first), 24), np.float32)
+
+    return give
+
+
 def test_words_are_learned_from_a_stream_in_bounded_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """And they are the words that the same descriptors in memory give, to the byte."""
     monkeypatch.setattr(chunks, "IN_MEMORY", 1 << 16)
     spec = DescriptorSpec(kind="npy", columns=24)
+    options = DictionarySetOptions(sizes=(2, 3), epochs=2)
 
-    def pieces(n: int) -> Callable[[], Iterator[NDArray[np.float32]]]:
-        def give() -> Iterator[NDArray[np.float32]]:
-            for first in range(0, n, 1000):
-                yield np.random.default_rng(first).random((min(1000, n - first), 24), np.float32)
+    def fit(n: int) -> DictionarySet:
+        places = Labels(("hall", "kitchen", "")[row % 3] for row in range(n))
+        return DictionarySet.fit(pieces(n), spec=spec, places=places, options=options)
 
-        return give
+    fit(100)
+    few, many = peak(lambda: fit(10_000)), peak(lambda: fit(100_000))
+    assert (many - few) / 90_000 < 24, "the number of its place takes 8 bytes, and a row has 96"
+    rows, places = np.concatenate(list(pieces(10_000)())), [("hall", "kitchen", "")[row % 3] for row in range(10_000)]
+    whole = DictionarySet.fit(rows, spec=spec, places=places, options=options)
+    assert fit(10_000).fingerprint == whole.fingerprint
+
+
+def test_one_dictionary_takes_four_bytes_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chunks, "IN_MEMORY", 1 << 16)
+    spec = DescriptorSpec(kind="npy", columns=24)
 
     def fit(n: int) -> Dictionary:
         return Dictionary.fit(pieces(n), spec=spec, options=DictionaryOptions(size=3, epochs=2))
@@ -89,10 +119,6 @@ def test_words_are_learned_from_a_stream_in_bounded_memory(monkeypatch: pytest.M
     fit(100)
     few, many = peak(lambda: fit(10_000)), peak(lambda: fit(100_000))
     assert (many - few) / 90_000 < 12, "4 bytes are promised, and a row has 96"
-    whole = Dictionary.fit(
-        np.concatenate(list(pieces(10_000)())), spec=spec, options=DictionaryOptions(size=3, epochs=2)
-    )
-    assert fit(10_000).fingerprint == whole.fingerprint
 
 
 def test_models_are_trained_in_bounded_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -135,7 +135,7 @@ class DictionarySet:
 
         Raises VisionError for an image that cannot be used.
         """
-        found = self.words(descriptor(image, self.spec)[None])
+        found = words_in(self.dictionaries, descriptor(image, self.spec)[None], self._lookup)
         words = (one.vocabulary[int(units[0])] for one, (units, _) in zip(self.dictionaries, found, strict=True))
         return tuple(words), tuple(float(distances[0]) for _, distances in found)
 

@@ -24,7 +24,7 @@ def split(x: Floats, *, axis: int | None = None) -> tuple[Floats, Floats]:
     """
     unit: float | Floats
     if axis is None:
-        unit = math.ldexp(1, math.frexp(float(np.abs(x).max()))[1] - BITS)
+        unit = math.ldexp(1, math.frexp(np.maximum.reduce(np.abs(x), axis=None))[1] - BITS)
     else:
         unit = np.ldexp(1.0, np.frexp(np.abs(x).max(axis=axis, keepdims=True))[1] - BITS)
     coarse = np.rint(x / unit) * unit

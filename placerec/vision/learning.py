@@ -106,6 +106,9 @@ def checked_rows(descriptors: Singles, spec: DescriptorSpec, first: int = 0) -> 
     if rows.shape[1] != spec.length:
         raise VisionError(f"the descriptors have {rows.shape[1]} values, and the dictionary's have {spec.length}")
     rows = rows.astype(np.float32, copy=False)
+    # One frame, as it comes on the robot, is checked in a tenth of the time that pieces take.
+    if len(rows) == 1 and np.logical_and.reduce(np.isfinite(rows[0])):
+        return rows
     bad = first_unusable(rows)
     if bad is not None:
         raise VisionError(f"descriptor {first + bad} (from 0) holds NaN or infinite values; leave it out")

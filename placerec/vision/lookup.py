@@ -16,10 +16,11 @@ from placerec.vision.som import Units, rounding
 class Lookup:
     """What the search for one frame's words needs of D dictionaries, whatever the frame; made by `of`.
 
-    mean (d,), grid (d, V k) and scale (V k,): the projections of V views, one behind the other. places: per view the
-    units (K, k) that may answer, of all of its dictionaries. halves: of all, half the squared norms, and unit: the
-    index of each in its codebook. starts, sizes, largest (D,): where each dictionary begins among them, how many it
-    has and its largest squared norm. view (D,): the number of each dictionary's view.
+    mean (d,), grid (d, V k) and scale (V k,): the projections of V views, one behind the other. places: for every view
+    the units (K, k) that may answer, of all dictionaries of the view, and together: those of all views. For each of
+    these halves, unit and owner: half the squared norm, the index in the codebook, the number of the dictionary. For
+    each dictionary starts, view (D,) and largest: the first unit, the number of the view; this and the largest squared
+    norm.
     """
 
     mean: Floats
@@ -29,10 +30,10 @@ class Lookup:
     together: Singles
     halves: Singles
     unit: Ints
+    owner: Ints
     starts: Ints
-    sizes: Ints
-    largest: tuple[float, ...]
     view: Ints
+    largest: tuple[tuple[int, float], ...]
 
     @classmethod
     def of(cls, dictionaries: Sequence[tuple[Pca, Units]]) -> "Lookup | None":
@@ -47,7 +48,6 @@ class Lookup:
             return None
         every = [units for _, units in dictionaries]
         sizes = np.array([len(units.places) for units in every])
-        starts = np.cumsum(sizes) - sizes
         own = [
             np.concatenate([units.places for units, number in zip(every, numbers, strict=True) if number == at])
             for at in range(len(views))
@@ -60,10 +60,10 @@ class Lookup:
             np.concatenate(own),
             np.concatenate([units.halves for units in every]),
             np.concatenate([np.arange(len(units.places)) if units.among is None else units.among for units in every]),
-            starts,
-            sizes,
-            tuple(units.largest for units in every),
+            np.repeat(np.arange(len(every)), sizes),
+            np.cumsum(sizes) - sizes,
             np.array(numbers),
+            tuple((number, units.largest) for number, units in zip(numbers, every, strict=True)),
         )
 
     def nearest(self, row: Singles) -> tuple[Ints, Singles] | None:
@@ -80,14 +80,13 @@ class Lookup:
             start += len(places)
         scores -= self.halves
         values = codes.astype(np.float64)
-        norms = np.square(values).sum(axis=1).tolist()
-        bounds = [
-            rounding(codes.shape[1]) * (math.sqrt(norms[view] * largest) + largest / 2)
-            for view, largest in zip(self.view.tolist(), self.largest, strict=True)
-        ]
-        best = np.maximum.reduceat(scores, self.starts) - np.array(bounds)
-        found = np.flatnonzero(scores >= np.repeat(best, self.sizes))
+        norms = [float(code @ code) for code in values]
+        share = rounding(codes.shape[1])
+        bounds = [share * (math.sqrt(norms[view] * largest) + largest / 2) for view, largest in self.largest]
+        best = np.maximum.reduceat(scores, self.starts) - bounds
+        (found,) = (scores >= best.take(self.owner)).nonzero()
         if len(found) > len(bounds):
             return None
-        difference = values[self.view] - self.together[found]
-        return self.unit[found], np.sqrt(np.square(difference).sum(axis=1)).astype(np.float32)
+        difference = values.take(self.view, axis=0)
+        difference -= self.together.take(found, axis=0)
+        return self.unit[found], np.sqrt(np.add.reduce(np.square(difference), axis=1)).astype(np.float32)

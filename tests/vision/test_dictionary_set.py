@@ -203,6 +203,23 @@ def test_a_file_with_wrong_content_is_refused(
     assert str(caught.value).endswith("; make it again with `placerec train-words`")
 
 
+def test_no_flipped_byte_is_a_traceback(tmp_path: Path) -> None:
+    path = tmp_path / "words.npz"
+    small = fit(sizes=(2, 3), components=2)
+    small.save(path)
+    data = path.read_bytes()
+    rng = np.random.default_rng(0)
+    refused = 0
+    # Half of them in the last bytes, where the zip keeps its directory.
+    for place in [*rng.integers(len(data), size=40), *rng.integers(len(data) - 900, len(data), size=40)]:
+        path.write_bytes(data[:place] + bytes([data[place] ^ 0x41]) + data[place + 1 :])
+        try:
+            assert DictionarySet.load(path).fingerprint == small.fingerprint
+        except VisionError:
+            refused += 1
+    assert refused > 40
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
