@@ -16,6 +16,7 @@ from placerec.errors import SourceError, at
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
 from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames
+from placerec.frames.intervals import checked_seconds, find_intervals
 from placerec.frames.layouts import (
     COLD_CAMERA,
     COLD_LIST_FOLDER,
@@ -28,7 +29,7 @@ from placerec.frames.layouts import (
 )
 from placerec.frames.naming import own_name, unique_names
 from placerec.frames.places import check_place, check_twins, checked_place
-from placerec.frames.recordings import WANTED as RECORDED, checked_seconds, find_intervals, is_recording, read_recording
+from placerec.frames.recordings import WANTED as RECORDED, is_recording, read_recording
 from placerec.frames.sequence import Frame, Sequence, SourceOptions
 
 log = logging.getLogger(__name__)

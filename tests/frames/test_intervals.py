@@ -12,7 +12,7 @@ from hypothesis import given, strategies as st
 
 from placerec.errors import SourceError
 from placerec.frames import SourceOptions, find_sequences
-from placerec.frames.recordings import Interval, Intervals, read_intervals
+from placerec.frames.intervals import Interval, Intervals, read_intervals
 
 LABELS = """\ufeff# run through the house
 0.5 1   kitchen   # by the window
