@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -192,7 +193,7 @@ def work_options(function: Command) -> Command:
 
 
 def reading_options(note: str = "") -> Callable[[Command], Command]:
-    """--format, --every, --topic, --labels: how sources are to be read. The command gets `source_options`."""
+    """--format, --every, --topic, --labels...: how sources are to be read. The command gets `source_options`."""
 
     def decorated(function: Command) -> Command:
         @click.option(
@@ -213,12 +214,19 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
             help="Lines 'start end place' in seconds that label a video or a bag; or a folder of NAME.labels.  "
             "[default: NAME.labels beside it]",
         )
+        @click.option(
+            "--label-clock",
+            type=click.Choice(["auto", "stamps", "start"]),
+            default="auto",
+            help="What seconds in labels are: those of the frames' time stamps, or counted from the first frame.",
+        )
         @functools.wraps(function)
-        def read(*args: Any, format_: str, every: int, topic: str | None, labels: Path | None, **options: Any) -> Any:
+        def read(*args: Any, format_: str, **options: Any) -> Any:
             from placerec.frames.sequence import SourceOptions
 
+            settings = {field.name: options.pop(field.name) for field in fields(SourceOptions) if field.name in options}
             with usage("--labels"):
-                source_options = SourceOptions(format_, every, topic, labels)
+                source_options = SourceOptions(format_, **settings)
             return function(*args, source_options=source_options, **options)
 
         return read

@@ -13,15 +13,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.arrays import Singles
+from placerec.arrays import Ints, Singles
 from placerec.errors import PlacerecError, SourceError, check_optional
 from placerec.frames.image import as_gray, decode_gray
-from placerec.frames.sequence import Frame, Gray
+from placerec.frames.sequence import EPOCH, Frame, Gray
 
 SUFFIXES = (".bag", ".db3", ".mcap")
 METADATA = "metadata.yaml"
-# Messages that may wait for one that came later but is older; a clock that was set is worse than that.
-_WAITING = 100
+# Nanoseconds by which a message may be older than one that is stored before it; a clock that was set goes further back.
+_LATE = 10**9
 _REMEDIES = {
     ".bag": "mend it with `rosbag reindex`, or remove it",
     ".mcap": "mend it with `mcap recover`, or remove it",
@@ -105,27 +105,38 @@ def is_bag(path: Path) -> bool:
 def list_bag(path: Path, topic: str | None) -> tuple[str, "array[int]", list[float]]:
     """The topic of images in a bag, the rank of each of its messages in order of time, and the times in that order.
 
-    Times are the header's stamps in seconds, or where such a stamp is 0 when the message was stored; if the stamps jump
-    about, all are of the latter. Raises MissingExtraError without rosbags, SourceError for a bag that cannot be read
-    or without such a topic; what a damaged bag still gives is kept, and the rest told of in a warning.
+    Times are the header's stamps in seconds; or, with a warning, all are when messages were stored: if some stamps are
+    0 or by another clock, and if they go back by more than a second. Raises MissingExtraError without rosbags,
+    SourceError for a bag that cannot be read or without such a topic; what a damaged bag still gives is kept, and the
+    rest told of in a warning.
     """
     stamps, stored = array("q"), array("q")
     with _opened(path) as reader:
         topic = _choose(path, reader, topic)
         for _, when, data in _messages(reader, path, topic):
-            stamps.append(_stamp(data, _is_ros1(path)) or when)
+            stamps.append(_stamp(data, _is_ros1(path)))
             stored.append(when)
     if not stored:
         raise SourceError(f"{path}: holds no image on {topic}; name another topic, or remove it")
     times = np.array(stamps, np.int64)
-    order = np.argsort(times, kind="stable")
-    if np.abs(order - np.arange(len(order))).max() > _WAITING:
-        log.warning("%s: the stamps on %s jump; the times are those at which images were stored", path, topic)
+    if reason := _unusable(times):
+        if times.any():
+            log.warning("%s: the stamps on %s %s; the times are those at which images were stored", path, topic, reason)
         times = np.array(stored, np.int64)
-        order = np.argsort(times, kind="stable")
+    order = np.argsort(times, kind="stable")
     ranks = np.empty(len(order), np.int64)
     ranks[order] = np.arange(len(order))
     return topic, array("q", ranks.tolist()), (times[order] / 1e9).tolist()
+
+
+def _unusable(stamps: Ints) -> str:
+    """Why stamps in nanoseconds, in the order of storing, are no times of one sequence; "" if they are."""
+    if not stamps.all():
+        return "are 0 in part"
+    early = stamps < EPOCH * 10**9
+    if early.any() and not early.all():
+        return "are by two clocks"
+    return "jump" if (np.maximum.accumulate(stamps) - stamps).max() > _LATE else ""
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import logging
 import math
 import os
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +16,7 @@ from pathlib import Path
 from placerec.errors import SourceError, at
 from placerec.files import number_in, read_lines
 from placerec.frames.places import checked_place
+from placerec.frames.sequence import EPOCH
 
 SUFFIX = ".labels"
 log = logging.getLogger(__name__)
@@ -42,17 +43,30 @@ class Intervals:
         """Every place, and the file and line that name it."""
         return ((one.place, f"{self.path}:{one.line}") for one in self.intervals)
 
-    def places(self, times: list[float]) -> list[str]:
+    def places(self, times: Sequence[float], clock: str = "auto") -> list[str]:
         """The place at each of these times (in order), "" where there is none.
 
-        Seconds are those of the time stamps; or, if no interval reaches the first of these, seconds from that one on:
-        nobody writes down the seconds since 1970 that a bag's stamps count.
+        `clock`: see `SourceOptions.label_clock`. "auto" counts from the first frame if no interval reaches it: nobody
+        writes down the seconds since 1970 that a bag's stamps count. Of the reading that was taken it tells unless
+        times are since 1970, and warns where the other one gives other places.
         """
         if not times or not self.intervals:
             return [""] * len(times)
-        zero = times[0] if self.intervals[-1].end <= times[0] else 0.0
-        if zero:
-            log.info("%s: its seconds are counted from the first frame", self.path)
+        from_start = clock == "start" or (clock == "auto" and self.intervals[-1].end <= times[0])
+        found = self._at(times, times[0] if from_start else 0.0)
+        if clock == "auto" and times[0] and (from_start or times[0] < EPOCH):
+            other = self._at(times, 0.0 if from_start else times[0])
+            if times[0] >= EPOCH or found == other:
+                level, remedy = logging.INFO, ""
+            else:
+                level, remedy = logging.WARNING, f"; if not, say --label-clock {'stamps' if from_start else 'start'}"
+            what = "counted from the first frame" if from_start else f"the frames', of which the first is {times[0]:g}"
+            log.log(level, "%s: its seconds are %s%s", self.path, what, remedy)
+        if not any(found):
+            log.warning("%s: labels none of the %d frames", self.path, len(times))
+        return found
+
+    def _at(self, times: Sequence[float], zero: float) -> list[str]:
         starts = [one.start for one in self.intervals]
         found = []
         for time in times:
@@ -60,8 +74,6 @@ class Intervals:
             seconds = round(time - zero, 6)
             k = bisect_right(starts, seconds) - 1
             found.append(self.intervals[k].place if k >= 0 and seconds < self.intervals[k].end else "")
-        if not any(found):
-            log.warning("%s: labels none of the %d frames", self.path, len(times))
         return found
 
 

@@ -22,16 +22,17 @@ def read_recording(path: Path, labels: Intervals | None, options: SourceOptions)
     """
     if bag.is_bag(path):
         topic, ranks, stamps = bag.list_bag(path, options.topic)
-        frames = _frames(path, stamps, labels, options.every)
+        frames = _frames(path, stamps, labels, options)
         return frames, bag.Bag(path, topic, options.every, ranks, frames)
     times = video.list_times(path)
-    frames = _frames(path, times, labels, options.every)
+    frames = _frames(path, times, labels, options)
     return frames, video.Video(path, options.every, times, frames)
 
 
-def _frames(path: Path, times: Sequence[float], labels: Intervals | None, every: int) -> tuple[Frame, ...]:
-    chosen = [(number, times[number]) for number in range(0, len(times), every)]
-    places = labels.places([time for _, time in chosen]) if labels else [""] * len(chosen)
+def _frames(path: Path, times: Sequence[float], labels: Intervals | None, options: SourceOptions) -> tuple[Frame, ...]:
+    chosen = [(number, times[number]) for number in range(0, len(times), options.every)]
+    seconds = [time for _, time in chosen]
+    places = labels.places(seconds, options.label_clock) if labels else [""] * len(chosen)
     # Six digits: as many frames as ten hours have, so that names sort as frames do.
     return tuple(
         Frame(f"{number:06d}", time, place, path) for (number, time), place in zip(chosen, places, strict=True)

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from placerec.errors import SourceError
 
 Gray = NDArray[np.uint8 | np.float32]
+# The seconds since 1970 in 2001: what is less counts from something else, as from the start of a robot or a simulation.
+EPOCH = 10**9
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +60,7 @@ class Sequence:
 
 
 FORMATS = ("auto", "sequences", "places")
+CLOCKS = ("auto", "stamps", "start")
 
 
 @dataclass(frozen=True)
@@ -68,17 +71,22 @@ class SourceOptions:
     images); or "auto", which takes a folder of unlabelled, unstamped image folders for the latter and says so.
     `every`: of so many frames the first is read. `topic`: the topic of a bag, None for its only one of images.
     `labels`: the labels file of a video or a bag, or a folder of NAME.labels; None for NAME.labels beside it.
-    Raises SourceError for a value that does not exist.
+    `label_clock`: what the seconds in it are: "stamps", those of the frames' times; "start", counted from the first
+    frame; or "auto", which takes them for the latter if all end before the first frame. Raises SourceError for a value
+    that does not exist.
     """
 
     format: str = "auto"
     every: int = 1
     topic: str | None = None
     labels: Path | None = None
+    label_clock: str = "auto"
 
     def __post_init__(self) -> None:
         if self.format not in FORMATS:
             raise SourceError(f"format {self.format!r} is not known; choose one of {', '.join(FORMATS)}")
+        if self.label_clock not in CLOCKS:
+            raise SourceError(f"label clock {self.label_clock!r} is not known; choose one of {', '.join(CLOCKS)}")
         if self.every < 1:
             raise SourceError(f"every {self.every} frames is not possible; say 1 at least")
         if self.labels is not None and not self.labels.exists():

@@ -32,6 +32,12 @@ pytest.importorskip("rosbags")
 TOPIC = "/camera/image_raw"
 
 
+def shown_at(stamps: list[int], stored: list[int]) -> list[Message]:
+    """Pictures with these stamps, stored at these times."""
+    shown = zip(pictures(len(stamps)), stamps, stored, strict=True)
+    return [Message("sensor_msgs/msg/Image", raw(one, "bgr8").fields, stamp, when) for one, stamp, when in shown]
+
+
 def failure(path: Path, topic: str | None = None) -> str:
     with pytest.raises(SourceError) as error:
         find_one(path, topic=topic)
@@ -158,6 +164,53 @@ def test_without_stamps_or_with_a_clock_that_was_set_it_counts_when_messages_wer
     back = bag("back", [when if i < 110 else when - 10**15 for i, when in enumerate(stored)])
     assert [frame.time for frame in find_one(back).frames] == expected
     assert f"{back}: the stamps on {TOPIC} jump; the times are those at which images were stored" in caplog.messages
+
+
+@pytest.mark.parametrize("rate", [0.1, 1, 10, 100])
+@pytest.mark.parametrize("storage", ["ros1", "sqlite3", "mcap"])
+def test_a_clock_that_was_set_back_is_noticed_at_any_rate(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, storage: str, rate: float
+) -> None:
+    """Frames would be interleaved, and it does not matter how many there are before or after."""
+    stored = [START + round(i * 10**9 / rate) for i in range(60)]
+    stamps = [when - (round(20.3 * 10**9) if i >= 30 else 0) for i, when in enumerate(stored)]
+    path = write_bag(tmp_path / ("run.bag" if storage == "ros1" else "run"), {"/c": shown_at(stamps, stored)}, storage)
+    sequence = find_one(path)
+    assert [frame.time for frame in sequence.frames] == [when / 1e9 for when in stored]
+    assert f"{path}: the stamps on /c jump; the times are those at which images were stored" in caplog.messages
+    assert all(map(np.array_equal, read_images(sequence), grays(pictures(60))))
+
+
+def test_stamps_that_are_late_by_less_than_a_second_are_kept(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    stored = [START + i * STEP for i in range(20)]
+    stamps = [when - (9 * STEP if i == 15 else 0) + 7 for i, when in enumerate(stored)]
+    path = write_bag(tmp_path / "run", {"/c": shown_at(stamps, stored)})
+    assert [frame.time for frame in find_one(path).frames] == [when / 1e9 for when in sorted(stamps)]
+    assert not [record for record in caplog.records if record.levelno == logging.WARNING]
+
+
+@pytest.mark.parametrize(
+    ("stamps", "reason"),
+    [
+        ([0, 0, 0, *(i * STEP for i in range(3, 20))], "are 0 in part"),
+        ([0, 0, 0, *(START + i * STEP for i in range(3, 20))], "are 0 in part"),
+        ([12 * 10**9 + i * STEP if i < 3 else START + i * STEP for i in range(20)], "are by two clocks"),
+    ],
+)
+def test_two_clocks_are_never_mixed(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, stamps: list[int], reason: str
+) -> None:
+    stored = [START + i * STEP + 5 for i in range(20)]
+    path = write_bag(tmp_path / "run", {"/c": shown_at(stamps, stored)})
+    assert [frame.time for frame in find_one(path).frames] == [when / 1e9 for when in stored]
+    assert f"{path}: the stamps on /c {reason}; the times are those at which images were stored" in caplog.messages
+
+
+def test_stamps_of_a_simulation_are_times(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    stamps = [123 * 10**8 + i * STEP for i in range(20)]
+    path = write_bag(tmp_path / "run", {"/c": shown_at(stamps, [START + i for i in range(20)])})
+    assert [frame.time for frame in find_one(path).frames] == [when / 1e9 for when in stamps]
+    assert not [record for record in caplog.records if record.levelno == logging.WARNING]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from helpers.recordings import START, pictures, stream, write_bag, write_video
+from helpers.recordings import START, STEP, pictures, raw, stream, write_bag, write_video
 from hypothesis import given, strategies as st
 
 from placerec.errors import SourceError
@@ -23,8 +23,9 @@ LABELS = """\ufeff# run through the house
 """
 
 
-def places(path: Path, labels: Path | None = None, every: int = 1) -> list[str]:
-    (sequence,) = find_sequences([path], options=SourceOptions(labels=labels, every=every))
+def places(path: Path, labels: Path | None = None, every: int = 1, clock: str = "auto") -> list[str]:
+    options = SourceOptions(labels=labels, every=every, label_clock=clock)
+    (sequence,) = find_sequences([path], options=options)
     return [frame.place for frame in sequence.frames]
 
 
@@ -82,6 +83,36 @@ def test_seconds_of_a_bag_are_its_stamps_or_those_since_its_start(
     labels.write_text(f"{zero + 50} {zero + 51} hall\n")
     assert places(path) == [""] * 20
     assert caplog.messages == [f"{labels}: labels none of the 20 frames"]
+
+
+def test_of_stamps_that_are_not_since_1970_it_is_said_how_labels_were_read(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A simulation starts at 12.3 s: both readings of the labels are possible, and the wrong one shifts them."""
+    shifted = [raw(picture, "bgr8", 123 * 10**8 + i * STEP) for i, picture in enumerate(pictures())]
+    path = write_bag(tmp_path / "run", {"/c": shifted})
+    labels = tmp_path / "run.labels"
+    labels.write_text("0 1 hall\n1 30 office\n")
+    by_stamps, from_start = ["office"] * 20, ["hall"] * 10 + ["office"] * 10
+    caplog.set_level(logging.INFO)
+    assert places(path) == by_stamps
+    said = f"{labels}: its seconds are the frames', of which the first is 12.3; if not, say --label-clock start"
+    assert [(record.levelname, record.getMessage()) for record in caplog.records] == [("WARNING", said)]
+    caplog.clear()
+    assert places(path, clock="start") == from_start
+    assert places(path, clock="stamps") == by_stamps
+    assert caplog.messages == []
+    labels.write_text("0 1 hall\n1 12 office\n")
+    assert places(path) == from_start
+    assert caplog.messages == [
+        f"{labels}: its seconds are counted from the first frame; if not, say --label-clock stamps"
+    ]
+    labels.write_text("12.3 100 hall\n")
+    caplog.clear()
+    assert places(path) == ["hall"] * 20
+    assert caplog.records[0].levelname == "WARNING"
+    with pytest.raises(SourceError, match="label clock 'sun' is not known; choose one of auto, stamps, start"):
+        SourceOptions(label_clock="sun")
 
 
 def test_where_labels_are_looked_for(
