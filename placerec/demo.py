@@ -21,7 +21,7 @@ from placerec.jobs import ProgressBar
 from placerec.lab.layout import render_lab
 from placerec.lm.inspect import format_inspection, inspect_model
 from placerec.model import ModelOptions, load_recognizer, read_corpus, train_model
-from placerec.vision import Dictionary, DictionaryOptions, describe
+from placerec.vision import Dictionary, DictionaryOptions, DictionarySet, describe
 from placerec.words import read_stream
 from placerec.words.folder import write_tokens
 from placerec.words.tokenize import tokens_of
@@ -59,7 +59,7 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
             descriptors.values[training], spec=descriptors.spec, options=DictionaryOptions(seed=seed)
         )
         dictionary.save(folder / "words.npz")
-        write_tokens(tokens_of(descriptors, dictionary), dictionary, folder / "tokens")
+        write_tokens(tokens_of(descriptors, dictionary), DictionarySet.of(dictionary), folder / "tokens")
         log.info("Training language models and recognising run 3")
         beliefs = {way: _recognise(folder, *way) for way in product(SMOOTHINGS, ORDERS)}
         results = {way: evaluate(found) for way, found in beliefs.items()}

@@ -116,7 +116,7 @@ def test_the_node_publishes_what_the_recognizer_believes(tmp_path: Path, monkeyp
     run = write_images(tmp_path / "run")
     train_dictionary([run], tmp_path / "words.npz", options=DictionaryOptions(size=3))
     tokenize([run], tmp_path / "words.npz", tmp_path / "tokens")
-    train_lm([tmp_path / "tokens/run.tsv"], tmp_path / "model")
+    train_lm([tmp_path / "tokens/run.tsv"], tmp_path / "model", as_in_paper=True)
     messages = [
         CompressedImage(Header(Stamp(1000 + i, 500)), path.read_bytes())
         for i, path in enumerate(sorted((run / "std_cam").iterdir()))

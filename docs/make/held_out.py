@@ -8,8 +8,8 @@ import numpy as np
 from placerec.arrays import Floats
 from placerec.hohmm import filter_stream, fixed_transition
 from placerec.lm import count_ngrams
+from placerec.model import estimate_place
 from placerec.model.options import ModelOptions
-from placerec.model.train import estimate_place
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions
 from placerec.words import Selection, Sentences, WordStream, sentences_per_place
 from placerec.words.tokenize import tokens_of

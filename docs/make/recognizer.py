@@ -18,8 +18,8 @@ from single_frame import SEEDS, SIZE, arguments, described, fold_names
 from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.hohmm import Beliefs, Recognizer, Transition, fixed_transition, learned_transition
 from placerec.lm import count_ngrams
+from placerec.model import estimate_place
 from placerec.model.options import ModelOptions
-from placerec.model.train import estimate_place
 from placerec.vision import Dictionary, DictionaryOptions
 from placerec.words import WordStream, parse_selection, place_steps, sentences_per_place
 from placerec.words.tokenize import tokens_of

@@ -72,6 +72,9 @@ _model_argument = click.argument("model", metavar="MODEL/", type=shared.PATH)
 @click.option(
     "--vocab", metavar="FILE", type=shared.PATH, help="All words, one a line.  [default: vocab.txt beside TOKENS]"
 )
+@click.option(
+    "--as-in-paper", is_flag=True, help="Train on the first dictionary alone, and learn nothing of how words weigh."
+)
 @shared.output_option("MODEL/", "The folder to write: one ARPA file per place, and what made it.")
 @shared.cluster_option
 @shared.talk_options
@@ -80,11 +83,15 @@ def train_lm(
     select: str,
     min_count: str,
     vocab: Path | None,
+    as_in_paper: bool,
     out: Path,
     work: "Executor | None",
     **options: Any,
 ) -> None:
     """Train one n-gram model per place, as ARPA files.
+
+    Each dictionary of TOKENS gets its models. How much the words weigh (alpha), and how fast the filter forgets
+    (memory), is learned from the sequences, each group of them judged by the others, and kept in model.json.
 
     TOKENS are token streams (.tsv), folders of them, or one folder of sentences: PLACE.txt, one visit a line.
     """
@@ -97,7 +104,7 @@ def train_lm(
         selection = parse_selection(select)
     chosen = ModelOptions(min_count=minima, select=selection, **options)
     with shared.progress_bar("train-lm") as progress:
-        run(tokens, out, options=chosen, vocabulary=vocab, work=work, progress=progress)
+        run(tokens, out, options=chosen, vocabulary=vocab, as_in_paper=as_in_paper, work=work, progress=progress)
 
 
 @click.command(epilog="Example: placerec update model/ tokens/today.tsv")
@@ -202,7 +209,7 @@ def check(models: tuple[Path, ...], as_json: bool) -> None:
 @click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
 @click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=shared.PATH_OR_STREAM)
 @click.option("-m", "--model", metavar="MODEL/", type=shared.PATH, required=True, help="The folder of train-lm.")
-@shared.words_option(False, "The dictionary, if TOKENS are images.")
+@shared.words_option(False, "The dictionary, if TOKENS are images.  [default: MODEL/words.npz, if it is there]")
 @shared.reading_options(" of images")
 @shared.decoding_options
 @click.option("--viterbi", is_flag=True, help="Write the most probable path as best.")
@@ -235,7 +242,7 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: 
         check_method(how["method"], how["options"], scorer=how["scorer"])
     words = how["words"]
     if live:
-        if words is None or len(tokens) > 1 or _STDIN in tokens:
+        if not (words or (how["model"] / "words.npz").exists()) or len(tokens) > 1 or _STDIN in tokens:
             raise click.UsageError("--live takes one camera or video, and needs -w to see it")
         _check_answering("--live", out, how["options"])
         with closing(decode_live(tokens[0], **how)) as answers:

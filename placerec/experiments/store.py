@@ -25,7 +25,7 @@ from placerec.frames import Sequence as FrameSequence, files_of
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.version import __version__
-from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions, describe
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions, DictionarySet, describe
 from placerec.vision.storage import read_npz, write_npz
 from placerec.words.folder import VOCABULARY, write_tokens
 from placerec.words.tokenize import tokens_of
@@ -197,4 +197,4 @@ def make_tokens(job: WordsJob) -> None:
     """Learn the words and write the token streams, as `placerec train-words` and `placerec tokenize` do."""
     dictionary = job.dictionary()
     streams = (stream for one in (*job.train, *job.test) for stream in tokens_of(one.load(), dictionary))
-    write_tokens(streams, dictionary, job.folder)
+    write_tokens(streams, DictionarySet.of(dictionary), job.folder)

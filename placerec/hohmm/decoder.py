@@ -4,7 +4,7 @@ import copy
 import logging
 import math
 import os
-from collections.abc import Callable, Collection, Container
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
@@ -17,9 +17,10 @@ from placerec.errors import ModelError, StreamError
 from placerec.frames.folder import SUFFIXES
 from placerec.hohmm.beliefs import UNKNOWN_PLACE, Beliefs, list_places
 from placerec.words import Selection, WordStream, selector
+from placerec.words.stream import column_of
 
 if TYPE_CHECKING:
-    from placerec.vision import Dictionary
+    from placerec.vision import Dictionary, DictionarySet
 
 log = logging.getLogger(__name__)
 
@@ -55,21 +56,26 @@ class Belief(NamedTuple):
 # The belief after a selected word: float64 (C,) in the places; that the place is none of them, None where nobody asked;
 # and whether any place gives the word a probability above 0. A plain tuple: it is made for every frame.
 Posterior = tuple[Floats, float | None, bool]
-# Takes in a selected word: the word, the steps since the selected word before (None for the first), and the distance
-# from the frame's descriptor to the word (None where it is unknown).
-TakeIn = Callable[[str, float | None, float | None], Posterior]
+# Takes in a frame's selected words: the word of each dictionary (None where none is selected), the steps since the
+# selected words before (None for the first), and the distance from the frame's descriptor to each word (None where it
+# is unknown).
+TakeIn = Callable[[Sequence[str | None], float | None, Sequence[float | None]], Posterior]
+# The word of a frame, or its words in several dictionaries; and its distance, or that of each word.
+Words = str | Sequence[str]
+Distances = float | Sequence[float | None] | None
 
 
 @dataclass
 class _Sequence:
-    """The sequence so far: the posterior, what takes in the next word and what selects it; frames, and the last time.
+    """The sequence so far: the posterior, what takes in the next words; frames, and the last time.
 
-    `updated`: frame and time of the last selected word, None before the first.
+    `keep`: what selects the words of each dictionary. `updated`: frame and time of the last selected word, None before
+    the first.
     """
 
     posterior: Posterior
     take_in: TakeIn
-    keep: Callable[[str], bool]
+    keep: Sequence[Callable[[str], bool]]
     frame: int = 0
     time: float | None = None
     updated: tuple[int, float | None] | None = None
@@ -79,9 +85,10 @@ class SequenceDecoder:
     """Beliefs over places on-line, in constant memory, from words that are selected as in training.
 
     A word that the selection skips leaves the belief as it is (readings A16). More than `max_gap` seconds between two
-    frames begin a new sequence. `dictionary` turns images into words. Attributes without an underscore cannot be
-    assigned: decoding a whole sequence and word by word would part ways; `changed` makes a copy with other settings.
-    A subclass says in `_begin` what is believed before any word, and how a word changes that.
+    frames begin a new sequence. `dictionary` turns images into words. `words`: the vocabulary of each dictionary, by
+    the dictionary's name; they have no word in common. Attributes without an underscore cannot be assigned: decoding a
+    whole sequence and word by word would part ways; `changed` makes a copy with other settings. A subclass says in
+    `_begin` what is believed before any word, and how words change that.
     """
 
     _SETTINGS: tuple[str, ...] = ("selection", "dictionary", "max_gap")
@@ -91,17 +98,18 @@ class SequenceDecoder:
     def __init__(
         self,
         places: Collection[str],
-        words: Collection[str],
+        words: Mapping[str, Collection[str]],
         *,
         selection: Selection = Selection(),
-        dictionary: "Dictionary | None" = None,
+        dictionary: "Dictionary | DictionarySet | None" = None,
         max_gap: float | None = None,
     ) -> None:
         self.places: Final = tuple(places)
         self.selection: Final = selection
         self.dictionary: Final = dictionary
         self.max_gap: Final = max_gap
-        self._words = words
+        self._vocabularies = words
+        self._number = _numbered(words)
         self._restart()
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -111,7 +119,8 @@ class SequenceDecoder:
         super().__setattr__(name, value)
 
     def __repr__(self) -> str:
-        sizes = f"{list_places(self.places)}; {len(self._words)} words"
+        several = f" of {len(self._vocabularies)} dictionaries" if len(self._vocabularies) > 1 else ""
+        sizes = f"{list_places(self.places)}; {len(self._number)} words{several}"
         return f"{type(self).__name__}({sizes}; {self._settings()})"
 
     def _settings(self) -> str:
@@ -120,7 +129,7 @@ class SequenceDecoder:
         return f"selection {self.selection}{gap}"
 
     def __contains__(self, word: object) -> bool:
-        return word in self._words
+        return word in self._number
 
     def changed(self, **settings: Any) -> Self:
         """A copy with other settings, named as the arguments of the class, at the beginning of a sequence.
@@ -152,50 +161,75 @@ class SequenceDecoder:
         return self._zero_likelihood_words
 
     @property
+    def several(self) -> bool:
+        """Whether a frame has words of several dictionaries."""
+        return len(self._vocabularies) > 1
+
+    @property
     def asks_unknown(self) -> bool:
         """Whether beliefs tell the probability that the place is none of `places`."""
         return self._now.posterior[1] is not None
 
     def reset(self) -> None:
         """Forget the sequence so far: the belief is that before any word, and no word has been seen."""
-        self._now = _Sequence(*self._begin(), selector(self.selection))
+        self._now = _Sequence(*self._begin(), [selector(self.selection) for _ in self._vocabularies])
 
     def update(
-        self, word_or_image: "str | NDArray[Any]", time: float | None = None, distance: float | None = None
+        self, words_or_image: "Words | NDArray[Any]", time: float | None = None, distance: Distances = None
     ) -> Belief:
         """The belief after one more frame: its word, or its image (h, w) grey 0..255 if there is a dictionary.
 
-        `time` in seconds: needed with a largest gap and with transitions per second. `distance` of a word, from the
-        descriptor to its unit: evidence for a place that is unknown; that of an image comes from the dictionary. Raises
-        ModelError for a word that is not in the vocabulary, for an image without a dictionary, and for a time that is
-        needed and missing, or goes back; nothing has changed then.
+        Of several dictionaries a sequence of words, one of each at most, in any order. `time` in seconds: needed with a
+        largest gap and with transitions per second. `distance` of a word, from the descriptor to its unit, or those of
+        the words: evidence for a place that is unknown; those of an image come from the dictionary. Raises ModelError
+        for a word that is not in the vocabulary, for an image without a dictionary, and for a time that is needed and
+        missing, or goes back; nothing has changed then.
         """
-        if isinstance(word_or_image, str):
-            word = word_or_image
+        if isinstance(words_or_image, np.ndarray) or not isinstance(words_or_image, Sequence):
+            words, far = self._look(words_or_image)
         else:
-            word, distance = self._look(word_or_image)
-        if word not in self._words:
-            raise ModelError(f"the word {word!r} is not in the models' vocabulary{_image_hint(word)}")
+            words, far = _columns(words_or_image, distance)
+        taken: list[str | None] = [None] * len(self._vocabularies)
+        distances: list[float | None] = [None] * len(taken)
+        for word, own in zip(words, far, strict=True):
+            number = self._number.get(word)
+            if number is None:
+                raise ModelError(f"the word {word!r} is not in the models' vocabulary{_image_hint(word)}")
+            if taken[number] is not None:
+                raise ModelError(f"the words {taken[number]!r} and {word!r} are of one dictionary; give one a frame")
+            taken[number], distances[number] = word, own
+        if not words:
+            raise ModelError("no word is given; a frame without a word is told by skip()")
         self._pass(time, needed=self._needs_times)
         now = self._now
-        selected = now.keep(word)
+        selected = False
+        for number, given in enumerate(taken):
+            if given is not None and now.keep[number](given):
+                selected = True
+            else:
+                taken[number] = None
         if selected:
-            now.posterior = now.take_in(word, self._steps(now), distance)
+            now.posterior = now.take_in(taken, self._steps(now), distances)
             now.updated = now.frame, now.time
             if not now.posterior[2]:
                 self._zero_likelihood_words += 1
         # As `belief` does; a call more would be felt on-line.
         probability, unknown, _ = now.posterior
-        return Belief(self.places, probability.copy(), word, selected, unknown)
+        return Belief(self.places, probability.copy(), words[0], selected, unknown)
 
-    def answer(self, word: str, time: float | None = None, distance: float | None = None) -> Belief:
-        """The belief after one more frame and its word, which holds the belief if it is not in the vocabulary.
+    def answer(self, words: Words, time: float | None = None, distance: Distances = None) -> Belief:
+        """The belief after one more frame and its word or words, which hold the belief if none is in the vocabulary.
 
         `time`, `distance`, and what is raised for a time: see `update`.
         """
-        if word in self._words:
-            return self.update(word, time, distance)
-        return self.skip(time)._replace(word=word)
+        given, far = _columns(words, distance)
+        listed = [pair for pair in zip(given, far, strict=True) if pair[0] in self._number]
+        if len(listed) == len(given):
+            return self.update(given, time, far)
+        if not listed:
+            return self.skip(time)._replace(word=given[0])
+        known, distances = zip(*listed, strict=True)
+        return self.update(known, time, distances)._replace(word=given[0])
 
     def skip(self, time: float | None = None) -> Belief:
         """The belief after one more frame that has no word: it is held, but the frame and its time count."""
@@ -214,12 +248,14 @@ class SequenceDecoder:
         is needed and missing, or goes back.
         """
         self.reset()
-        warn_of_unlisted(stream, self)
+        warn_of_unlisted(stream, self._vocabularies)
         rows = []
-        frames = zip(stream.words, stream.times.tolist(), stream.distances.tolist(), strict=True)
-        for name, (word, time, distance) in zip(stream.frames, frames, strict=True):
+        columns = [stream.in_dictionary(name) for name in self._vocabularies if name in stream.dictionaries]
+        words = zip(*(column.words for column in columns), strict=True)
+        distances = zip(*(column.distances.tolist() for column in columns), strict=True)
+        for name, time, given, far in zip(stream.frames, stream.times.tolist(), words, distances, strict=True):
             try:
-                rows.append(self.answer(word, time, distance))
+                rows.append(self.answer(given, time, far))
             except ModelError as error:
                 raise StreamError(f"{stream.name}: frame {name!r}: {error}") from error
         return Beliefs.of(
@@ -258,20 +294,50 @@ class SequenceDecoder:
             return now.time - time
         return 1.0
 
-    def _look(self, image: NDArray[Any]) -> tuple[str, float]:
+    def _look(self, image: NDArray[Any]) -> tuple[Sequence[str], Sequence[float | None]]:
         if isinstance(image, os.PathLike):
             raise ModelError(f"{str(image)!r} is a path, and a word or an image is expected{_image_hint(str(image))}")
         if self.dictionary is None:
             raise ModelError("an image needs a dictionary to become a word; give the recognizer the words.npz")
-        return self.dictionary.word_of(image)
+        words, distances = self.dictionary.words_of(image)
+        # A system of one dictionary leaves the others' words aside.
+        listed = [(word, far) for word, far in zip(words, distances, strict=True) if word in self._number]
+        return ([word for word, _ in listed], [far for _, far in listed]) if listed else (words, distances)
 
 
-def warn_of_unlisted(stream: WordStream, listed: Container[str]) -> None:
-    """Say how many words of a stream are not `listed`, if any."""
-    unlisted = [word for word in stream.words if word not in listed]
+def _numbered(vocabularies: Mapping[str, Collection[str]]) -> dict[str, int]:
+    """The number of each word's dictionary; ModelError for a word of two."""
+    number: dict[str, int] = {}
+    for d, (name, words) in enumerate(vocabularies.items()):
+        for word in words:
+            if number.setdefault(word, d) != d:
+                raise ModelError(f"the word {word!r} of the dictionary {name!r} is one of another, too; rename it")
+    return number
+
+
+def _columns(words: Words, distance: Distances) -> tuple[Sequence[str], Sequence[float | None]]:
+    """Words and distances of a frame, one of each or several, as sequences."""
+    if isinstance(words, str):
+        words = (words,)
+    if isinstance(distance, Sequence):
+        return words, distance
+    return words, [distance] * len(words)
+
+
+def warn_of_unlisted(stream: WordStream, vocabularies: Mapping[str, Container[str]]) -> None:
+    """Say how many words of a stream are not listed, and of which dictionaries it has no words, if any.
+
+    `vocabularies`: the listed words of each dictionary, by the dictionary's name.
+    """
+    unlisted = []
+    for name, listed in vocabularies.items():
+        if name in stream.dictionaries:
+            unlisted += [word for word in stream.in_dictionary(name).words if word not in listed]
     if unlisted:
         message = "%s: words that the models do not list: %d skipped, %r first"
         log.warning(message, stream.name, len(unlisted), unlisted[0])
+    if missing := [column_of(name) for name in vocabularies if name not in stream.dictionaries]:
+        log.warning("%s: has no column %s; what there is decides alone", stream.name, ", ".join(missing))
 
 
 def _image_hint(text: str) -> str:

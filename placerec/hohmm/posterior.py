@@ -5,6 +5,7 @@ ordinary hidden Markov model over C places, which has these further algorithms. 
 above 0 is no evidence here, as it is none for the filter.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -118,7 +119,7 @@ def posterior(
 def unknown_posterior(
     evidence: Evidence,
     transition: Transition,
-    model: UnknownModel,
+    models: Sequence[UnknownModel],
     distances: Floats,
     *,
     smooth: bool = False,
@@ -126,20 +127,26 @@ def unknown_posterior(
 ) -> Floats:
     """The probability at every frame that the place is none of the known ones, float64 (n,).
 
-    `distances` (U,): of the selected words, nan where unknown. `smooth`, `lag`: see `posterior`.
+    `models`: of each of D dictionaries. `distances` (D, U): of the selected words, nan where unknown. `smooth`, `lag`:
+    see `posterior`.
     """
-    places = evidence.log10_likelihoods.shape[1]
-    ratios = unknown_ratios(evidence, transition, model, distances)
-    chain = replace(evidence, log10_likelihoods=unknown.chain_evidence(ratios, places))
+    places = evidence.own.shape[2]
+    ratios = unknown_ratios(evidence, transition, models, distances)
+    chain = replace(evidence, own=unknown.chain_evidence(ratios, places)[None], alpha=1.0)
     belief, _ = posterior(chain, unknown.CHAIN, smooth=smooth, lag=lag)
     before, _ = unknown.prior(places)
     return np.where(evidence.updates > 0, belief[:, 0], before)
 
 
-def unknown_ratios(evidence: Evidence, transition: Transition, model: UnknownModel, distances: Floats) -> Floats:
-    """What each selected word says of a new place, float64 (U,): `unknown.evidence` beside the filter of the places."""
+def unknown_ratios(
+    evidence: Evidence, transition: Transition, models: Sequence[UnknownModel], distances: Floats
+) -> Floats:
+    """What each selected frame says of a new place, float64 (U,): `unknown.evidence_of_all` beside the filter.
+
+    `models`, `distances`: see `unknown_posterior`.
+    """
     predicted, _ = beliefs_around(evidence.log10_likelihoods, transition, evidence.elapsed)
-    return unknown.evidence(model, evidence.log10_likelihoods, predicted, distances)
+    return unknown.evidence_of_all(models, evidence.own, predicted, distances)
 
 
 def beliefs_around(log10_likelihoods: Floats, transition: Transition, elapsed: Floats) -> tuple[Floats, Floats]:

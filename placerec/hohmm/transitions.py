@@ -98,13 +98,30 @@ def fixed_transition(places: int, stay: float = 0.99, per: str = "update") -> Tr
     return Transition(matrix, per, change if change <= 1 else None)
 
 
-def learned_transition(counts: Sequence[Sequence[int]] | Ints) -> Transition:
+def learned_transition(
+    counts: Sequence[Sequence[int]] | Ints, memory: float = 0.0, shares: Floats | None = None
+) -> Transition:
     """Transitions per frame from `counts` (C, C) of steps from one frame's place to the next one's.
 
-    A Dirichlet prior of 1/C is added to every cell, so that no change is impossible.
+    A Dirichlet prior of 1/C is added to every cell, so that no change is impossible. `memory`, `shares`: see
+    `forgetting`.
     """
     smoothed = np.asarray(counts, np.float64) + 1 / len(counts)
-    return Transition(smoothed / smoothed.sum(axis=1, keepdims=True), "frame")
+    learned = Transition(smoothed / smoothed.sum(axis=1, keepdims=True), "frame")
+    return learned if shares is None else forgetting(learned, memory, shares)
+
+
+def forgetting(transition: Transition, memory: float, shares: Floats) -> Transition:
+    """Transitions that at each step replace the share `memory` of any belief by the places' `shares` (C,).
+
+    At 0 nothing is forgotten, at 1 each frame stands alone. Raises ModelError for another number.
+    """
+    if not 0 <= memory <= 1:
+        raise ModelError(f"memory {memory:g} is not between 0 and 1")
+    if memory == 0:
+        return transition
+    mixed = (1 - memory) * transition.matrix + memory * shares
+    return Transition(mixed / mixed.sum(axis=1, keepdims=True), transition.per)
 
 
 def _product(a: Floats, b: Floats) -> Floats:

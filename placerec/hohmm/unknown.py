@@ -134,8 +134,26 @@ def measure_distances(distances: Floats, places: Ints, histograms: Sequence[Hist
     return float(outlying.mean()), float(outlying.var())
 
 
+def evidence_of_all(
+    models: Sequence[UnknownModel], log10_likelihoods: Floats, predicted: Floats, distances: Floats
+) -> Floats:
+    """The mean of `evidence` over dictionaries, float64 (T,): words of one frame say much the same of a new place.
+
+    models: of D dictionaries; log10_likelihoods: (D, T, C) of their words in each place, nan where a dictionary says
+    nothing; predicted: (T, C) the filter's belief before each frame; distances: (D, T), nan where unknown.
+    """
+    if len(models) == 1:
+        return evidence(models[0], log10_likelihoods[0], predicted, distances[0])
+    ratio, heard = np.zeros(len(predicted)), np.zeros(len(predicted))
+    for model, likelihoods, far in zip(models, log10_likelihoods, distances, strict=True):
+        said = ~np.isnan(likelihoods).any(axis=1)
+        ratio[said] += evidence(model, likelihoods[said], predicted[said], far[said])
+        heard += said
+    return ratio / np.maximum(heard, 1)
+
+
 def evidence(model: UnknownModel, log10_likelihoods: Floats, predicted: Floats, distances: Floats) -> Floats:
-    """log of p(frame | unknown) / p(frame | known), natural, (T,) for T selected frames.
+    """log of p(frame | unknown) / p(frame | known), natural, (T,) for T selected frames, by one dictionary.
 
     log10_likelihoods: (T, C) of each word in each place; predicted: (T, C) the filter's belief before each word
     (uniform before the first); distances: (T,), nan where unknown. A frame's evidence depends on its own row alone.

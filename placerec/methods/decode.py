@@ -14,8 +14,8 @@ from placerec.hohmm.beliefs import BeliefRow, Beliefs, format_beliefs, format_he
 from placerec.hohmm.explain import EXPLAINED
 from placerec.jobs import Progress
 from placerec.methods.decoders import HOHMM, make_decoder
-from placerec.model import Decoding, load_model
-from placerec.model.decoding import PAPER, token_streams
+from placerec.model import Decoding, PlaceModels, load_model
+from placerec.model.decoding import AS_LEARNED, token_streams
 from placerec.words import WordStream
 from placerec.words.folder import is_stream
 
@@ -31,30 +31,32 @@ def decode(
     words: Path | str | None = None,
     out: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
-    options: Decoding = PAPER,
+    options: Decoding = AS_LEARNED,
     scorer: str = "native",
     as_json: bool = False,
     progress: Progress | None = None,
 ) -> list[Beliefs]:
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
-    `sources`: token streams, or image sources (`source_options`) if `words` (a words.npz) is given. Without `out` there
-    must be one sequence only; explanations are written there, as NAME.explain.jsonl. `method`: one of `METHODS`.
-    Raises ModelError or StreamError for what cannot be read or does not belong together.
+    `sources`: token streams, or image sources (`source_options`), whose words come from `words` (a words.npz; by
+    default that in `model`). Without `out` there must be one sequence only; explanations are written there, as
+    NAME.explain.jsonl. `method`: one of `METHODS`. Raises ModelError or StreamError for what cannot be read or does not
+    belong together.
     """
 
     def opened() -> tuple[SequenceDecoder, list[WordStream]]:
         models = load_model(model)
-        if words is None:
+        path = words or (models.folder.words if _are_images(sources, models) else None)
+        if path is None:
             return make_decoder(method, models, options=options, scorer=scorer), token_streams(sources, models)
         # Only images need OpenCV and scipy.
-        from placerec.vision import Dictionary
+        from placerec.vision import DictionarySet
         from placerec.words.tokenize import streams_of
 
         for source in sources:
             if is_stream(Path(source)):
-                raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {words} out")
-        dictionary = Dictionary.load(words)
+                raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {path} out")
+        dictionary = DictionarySet.load(path)
         decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
         return decoder, streams_of(sources, dictionary, source_options=source_options, progress=progress)
 
@@ -81,6 +83,18 @@ def decode(
     return found
 
 
+def _are_images(sources: Sequence[Path | str], models: PlaceModels) -> bool:
+    """Whether a model that has its dictionary is asked for sources that hold neither token streams nor text."""
+    if not models.folder.words.exists():
+        return False
+    paths = [*map(Path, sources)]
+    return not any(is_stream(path) or path.suffix == ".txt" or _holds_streams(path) for path in paths)
+
+
+def _holds_streams(path: Path) -> bool:
+    return path.is_dir() and any(map(is_stream, path.iterdir()))
+
+
 def _decoded(decoder: SequenceDecoder, stream: WordStream, options: Decoding) -> Beliefs:
     # Other methods were checked to be asked for nothing of it.
     if isinstance(decoder, Recognizer):
@@ -98,21 +112,24 @@ def _spare_sources(sources: Sequence[Path | str], out: Path) -> None:
 def decode_lines(decoder: SequenceDecoder, lines: Iterable[str], *, as_json: bool = False) -> Iterator[str]:
     """`placerec decode -`: an answer for each line `word [TAB [seconds] [TAB distance]]`, as soon as it is read.
 
-    The TSV header comes before the first line is read. A word that the models do not list holds the belief; the first
-    one and the number of them are logged. Raises StreamError for seconds or a distance that are no number, and for
-    seconds that are needed (`SequenceDecoder.update`) and missing, or go back.
+    Of a decoder of several dictionaries a line has a word of each, with blanks between them, in any order. The TSV
+    header comes before the first line is read. A word that the models do not list holds the belief; the first one and
+    the number of them are logged. Raises StreamError for seconds or a distance that are no number, and for seconds that
+    are needed (`SequenceDecoder.update`) and missing, or go back.
     """
     if not as_json:
         yield format_header(decoder.places, unknown=decoder.asks_unknown)
     strange = 0
     for frame, line in enumerate(lines):
         word, time, distance = _fields(line, frame)
-        if word not in decoder:
-            if not strange:
-                log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, word)
-            strange += 1
+        words = word.split() if decoder.several else [word]
+        for one in words or [word]:
+            if one not in decoder:
+                if not strange:
+                    log.warning("<stdin>:%d: the word %r is not in the models' vocabulary; skipped", frame + 1, one)
+                strange += 1
         try:
-            belief = decoder.answer(word, time, distance)
+            belief = decoder.answer(words or [word], time, distance)
         except ModelError as error:
             raise StreamError(at("<stdin>", frame + 1, str(error))) from error
         yield format_belief(str(frame), time, "", belief, as_json=as_json)

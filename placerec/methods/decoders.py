@@ -1,6 +1,6 @@
 """Every system that learns from words alone, by name, and the decoder of a MODEL/ folder by each of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
@@ -25,11 +25,12 @@ from placerec.methods import (
 )
 from placerec.methods.training_set import MakeStepper, TrainingSet, read_training_set
 from placerec.model import Decoding, PlaceModels, load_model, make_recognizer
-from placerec.model.decoding import PAPER, check_online, check_words
+from placerec.model.decoding import AS_LEARNED, PAPER, as_in_paper, check_online, check_words
 from placerec.words import Selection
+from placerec.words.stream import FIRST
 
 if TYPE_CHECKING:
-    from placerec.vision import Dictionary
+    from placerec.vision import Dictionary, DictionarySet
 
 
 @dataclass(frozen=True)
@@ -76,15 +77,17 @@ class StepDecoder(SequenceDecoder):
         *,
         selection: Selection,
         max_gap: float | None,
-        dictionary: "Dictionary | None",
+        dictionary: "Dictionary | DictionarySet | None",
         unknown: bool,
     ) -> None:
-        self._number = {word: number for number, word in enumerate(training.vocabulary)}
+        self._index = {word: number for number, word in enumerate(training.vocabulary)}
         self._make_stepper, self._unknown = make_stepper, unknown
-        super().__init__(training.places, self._number, selection=selection, max_gap=max_gap, dictionary=dictionary)
+        super().__init__(
+            training.places, {FIRST: self._index}, selection=selection, max_gap=max_gap, dictionary=dictionary
+        )
 
     def _begin(self) -> tuple[Posterior, TakeIn]:
-        step, number = self._make_stepper(), self._number
+        step, number = self._make_stepper(), self._index
         C = len(self.places)
         columns = C + self._unknown
 
@@ -94,13 +97,14 @@ class StepDecoder(SequenceDecoder):
             known = belief[:-1]
             return known / known.sum(), float(belief[-1]), True
 
-        def take_in(word: str, steps: float | None, distance: float | None) -> Posterior:
-            return posterior(step(number[word], int(steps or 0)))
+        def take_in(words: Sequence[str | None], steps: float | None, distances: Sequence[float | None]) -> Posterior:
+            (word,) = words
+            return posterior(step(number[word or ""], int(steps or 0)))
 
         return posterior(np.full(columns, 1 / columns)), take_in
 
 
-def check_method(name: str, options: Decoding = PAPER, *, scorer: str = "native") -> None:
+def check_method(name: str, options: Decoding = AS_LEARNED, *, scorer: str = "native") -> None:
     """Raise ModelError if there is no method of this name for words alone, or if the options say nothing to it."""
     if name in NEED_DESCRIPTORS:
         raise ModelError(f"{name} needs descriptors, not words alone; `placerec compare` runs it")
@@ -116,7 +120,8 @@ def check_method(name: str, options: Decoding = PAPER, *, scorer: str = "native"
     elif method.fit_with_unknown is not None:
         allowed.add("unknown")
     for field in fields(options):
-        if field.name not in allowed and getattr(options, field.name) != field.default:
+        unused = (field.default, getattr(PAPER, field.name))
+        if field.name not in allowed and getattr(options, field.name) not in unused:
             raise ModelError(f"{name} has no use for {field.name.replace('_', '-')}; leave it out")
 
 
@@ -124,20 +129,23 @@ def make_decoder(
     name: str,
     model: PlaceModels,
     *,
-    options: Decoding = PAPER,
-    dictionary: "Dictionary | None" = None,
+    options: Decoding = AS_LEARNED,
+    dictionary: "Dictionary | DictionarySet | None" = None,
     scorer: str = "native",
 ) -> SequenceDecoder:
     """What decodes by the method `name`, on-line or a sequence at a time; for `hohmm` this is `make_recognizer`.
 
-    Systems that have emissions of their own go through the same filter, with the transitions of `options`. Raises
+    Systems that have emissions of their own go through the same filter, with the transitions of `options`, by default
+    the paper's: what training learned of weights is of `hohmm`. They see the words of the first dictionary. Raises
     ModelError as `check_method`, `read_training_set` and `make_recognizer` do.
     """
     check_method(name, options, scorer=scorer)
     method = METHODS[name]
     fit = (options.unknown and method.fit_with_unknown) or method.fit
     if fit is None:
-        emissions = method.emissions and method.emissions(read_training_set(model))
+        if method.emissions is None:
+            return make_recognizer(model, options=options, dictionary=dictionary, scorer=scorer)
+        emissions, options = method.emissions(read_training_set(model)), as_in_paper(options)
         return make_recognizer(model, options=options, dictionary=dictionary, scorer=scorer, emissions=emissions)
     check_words(model, dictionary)
     training = read_training_set(model)
@@ -151,7 +159,9 @@ def make_decoder(
     )
 
 
-def load_decoder(name: str, path: Path | str, *, options: Decoding = PAPER, scorer: str = "native") -> SequenceDecoder:
+def load_decoder(
+    name: str, path: Path | str, *, options: Decoding = AS_LEARNED, scorer: str = "native"
+) -> SequenceDecoder:
     """What decodes a MODEL/ folder by the method `name`, on-line; see `make_decoder`.
 
     Raises ModelError for options that need later words.

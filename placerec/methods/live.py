@@ -21,11 +21,11 @@ from placerec.hohmm import Belief, SequenceDecoder, format_header
 from placerec.methods.decode import format_belief
 from placerec.methods.decoders import HOHMM, make_decoder
 from placerec.model import load_model
-from placerec.model.decoding import PAPER, Decoding
+from placerec.model.decoding import AS_LEARNED, Decoding
 from placerec.words.folder import is_stream
 
 if TYPE_CHECKING:
-    from placerec.vision import Dictionary
+    from placerec.vision import Dictionary, DictionarySet
 
 log = logging.getLogger(__name__)
 
@@ -67,27 +67,28 @@ def decode_live(
     source: Path | str,
     model: Path | str,
     *,
-    words: Path | str,
+    words: Path | str | None = None,
     method: str = HOHMM,
     source_options: SourceOptions = SourceOptions(),
-    options: Decoding = PAPER,
+    options: Decoding = AS_LEARNED,
     scorer: str = "native",
     as_json: bool = False,
 ) -> Generator[str, None, None]:
     """`placerec decode --live`: the lines of a beliefs file, each as soon as its frame has come; TSV with a header.
 
     `source`: a camera, or a sequence whose frames have times, which is played at its own pace. See `follow_live`.
-    `method`: one of `METHODS`. Raises ModelError for options that look ahead or write files, and StreamError unless
-    `source` is one sequence of images.
+    `words`: the words.npz, by default that in `model`. `method`: one of `METHODS`. Raises ModelError for options that
+    look ahead or write files, and StreamError unless `source` is one sequence of images.
     """
-    from placerec.vision import Dictionary
+    from placerec.vision import DictionarySet
 
     if options.looks_ahead or options.explain:
         raise ModelError("live decoding answers before later words are known: no smooth, viterbi, lag or explain")
     if is_stream(Path(source)):
         raise StreamError(f"{source}: is a token stream, and live decoding is of images; name a camera or a video")
-    dictionary = Dictionary.load(words)
-    decoder = make_decoder(method, load_model(model), options=options, scorer=scorer, dictionary=dictionary)
+    models = load_model(model)
+    dictionary = DictionarySet.load(words or models.folder.words)
+    decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
     sequences = find_sequences([source], options=source_options, endless=True)
     if len(sequences) > 1:
         raise StreamError(f"{source}: holds {len(sequences)} sequences; name one of them to be played live")
@@ -102,7 +103,7 @@ def decode_live(
 
 def follow_live(
     sequence: Sequence,
-    dictionary: "Dictionary",
+    dictionary: "Dictionary | DictionarySet",
     decoder: SequenceDecoder,
     *,
     tell: Callable[[LiveReport], None] | None = None,
@@ -117,7 +118,7 @@ def follow_live(
     """
     tally = _Tally(sequence)
     # Filters are made when they are first needed: not while the first frames wait.
-    dictionary.word_of(_ANY)
+    dictionary.words_of(_ANY)
     with closing(LatestFrameQueue(lambda stopped: _live_frames(sequence, stopped))) as queue, ended_by_interrupt(queue):
         try:
             for live in queue:
@@ -142,18 +143,20 @@ def _live_frames(sequence: Sequence, stopped: Stopped) -> Iterator[LiveFrame]:
     return real_time(all_images(sequence), stopped)
 
 
-def _believed(live: LiveFrame, dictionary: "Dictionary", decoder: SequenceDecoder, tally: "_Tally") -> Belief | None:
+def _believed(
+    live: LiveFrame, dictionary: "Dictionary | DictionarySet", decoder: SequenceDecoder, tally: "_Tally"
+) -> Belief | None:
     frame, image = live.frame, live.image
     try:
         if isinstance(image, str):
             raise VisionError(image)
-        word, distance = dictionary.word_of(image)
+        words, distances = dictionary.words_of(image)
     except VisionError as error:
         tally.unusable(error)
         decoder.skip()
         return None
     try:
-        return decoder.answer(word, frame.time, distance)
+        return decoder.answer(words, frame.time, distances)
     except ModelError as error:
         raise StreamError(f"{tally.name}: frame {frame.name!r}: {error}") from error
 

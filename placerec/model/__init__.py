@@ -9,6 +9,10 @@ from placerec.model.decoding import (
     transition_of as transition_of,
 )
 from placerec.model.folder import PlaceModels as PlaceModels, load_model as load_model
-from placerec.model.options import ModelOptions as ModelOptions, parse_min_count as parse_min_count
-from placerec.model.train import estimate_place as estimate_place, train_lm as train_lm, train_model as train_model
+from placerec.model.options import (
+    ModelOptions as ModelOptions,
+    estimate_place as estimate_place,
+    parse_min_count as parse_min_count,
+)
+from placerec.model.train import train_lm as train_lm, train_model as train_model
 from placerec.model.update import update as update

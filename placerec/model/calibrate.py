@@ -13,15 +13,16 @@ from placerec.files import held_folder
 from placerec.hohmm import Beliefs
 from placerec.hohmm.calibration import Calibration, fit_calibration
 from placerec.hohmm.unknown import measure_distances
-from placerec.model.decoding import PAPER, Decoding, describe_decoding, make_recognizer, token_streams
+from placerec.model.decoding import AS_LEARNED, Decoding, describe_decoding, make_recognizer, token_streams
 from placerec.model.folder import PlaceModels, load_model
 from placerec.words import WordStream
 from placerec.words.folder import TokenMaker, dictionary_of, stream_files
+from placerec.words.stream import column_of
 
 log = logging.getLogger(__name__)
 
 
-def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decoding = PAPER) -> Calibration:
+def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decoding = AS_LEARNED) -> Calibration:
     """`placerec calibrate`: fit a temperature to the beliefs in labelled `tokens`, and keep it in model.json.
 
     `options`: the calibration holds for decoding with these. Frames without a label, and those of
@@ -36,11 +37,10 @@ def calibrate(model: Path | str, tokens: Sequence[Path | str], *, options: Decod
         recognizer = make_recognizer(models, options=options)
         decoded = [recognizer.decode(stream, smooth=options.smooth, lag=options.lag) for stream in streams]
         calibration = fit_calibration(*_judged(models, decoded))
-        distances = _measured(models, streams)
         models.description.write(
             calibration={
                 **vars(calibration),
-                "distances": distances and dict(zip(("shift", "variance"), distances, strict=True)),
+                **_measured(models, streams),
                 "options": describe_decoding(models, options),
                 "sequences": [stream.name for stream in streams],
             }
@@ -83,11 +83,19 @@ def _columns(models: PlaceModels, labels: Sequence[str]) -> Ints:
     return np.array([column.get(label, -1) for label in labels], dtype=np.int64)
 
 
-def _measured(models: PlaceModels, streams: Sequence[WordStream]) -> tuple[float, float] | None:
-    """How the distances of these frames differ from those in training, for `unknown`; None where there are none."""
-    histograms = models.description.distances
-    if not histograms:
-        return None
+def _measured(models: PlaceModels, streams: Sequence[WordStream]) -> dict[str, dict[str, float] | None]:
+    """How the distances of these frames differ from those in training, for `unknown`, as model.json names them.
+
+    None for a dictionary without distances.
+    """
     truth = _columns(models, [label for stream in streams for label in stream.places])
-    distances = np.concatenate([stream.distances for stream in streams])
-    return measure_distances(distances[truth >= 0], truth[truth >= 0], histograms)
+    found: dict[str, dict[str, float] | None] = {}
+    for name, one in models.dictionaries.items():
+        histograms, measured = one.description.distances, None
+        own = [stream.in_dictionary(name) for stream in streams if name in stream.dictionaries]
+        if histograms and len(own) == len(streams):
+            distances = np.concatenate([stream.distances for stream in own])
+            measured = measure_distances(distances[truth >= 0], truth[truth >= 0], histograms)
+        title = column_of(name).replace("word", "distances")
+        found[title] = measured and dict(zip(("shift", "variance"), measured, strict=True))
+    return found

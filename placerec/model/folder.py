@@ -6,32 +6,39 @@ MODEL/vocab.txt              all words
 MODEL/sentences/PLACE.txt    what was counted
 MODEL/counts/PLACE.counts    the counts
 MODEL/nonevents.txt          without markers: what the `ngram-count` commands need to leave </s> out
+MODEL/DICTIONARY/            the models of a further dictionary: a folder such as this one
+
+What `learn` made the models of is there, too: MODEL/words.npz and MODEL/tokens/.
 """
 
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from placerec.arrays import Floats
 from placerec.errors import ModelError, PlacerecError
 from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
 from placerec.hohmm import Calibration
 from placerec.hohmm.unknown import Histogram
+from placerec.hohmm.weights import Weights, shares_of
 from placerec.lm import BackoffModel, read_arpa
 from placerec.model.options import ModelOptions
 from placerec.model.record import LearnedSequence, Record, Route
 from placerec.version import __version__
 from placerec.words import Selection, Sentences, parse_selection, read_sentences
 from placerec.words.folder import VOCABULARY
+from placerec.words.stream import FIRST, column_of, dictionary_in
 
 FORMAT = "placerec model 1"
 MODEL_JSON = "model.json"
-OWNED = ("*.arpa", MODEL_JSON, VOCABULARY, "nonevents.txt", "sentences", "counts")
+WORDS, TOKENS = "words.npz", "tokens"
+OWNED = ("*.arpa", MODEL_JSON, VOCABULARY, "nonevents.txt", "sentences", "counts", WORDS, TOKENS)
 _RETRAIN, _RECALIBRATE = "train the model again", "run `placerec calibrate` again"
 
 
@@ -45,9 +52,10 @@ class PlaceFiles(NamedTuple):
 
 @dataclass(frozen=True)
 class ModelFolder:
-    """A MODEL/ folder, which need not be there yet."""
+    """A MODEL/ folder, or that of a further `dictionary` in one, which need not be there yet."""
 
     path: Path
+    dictionary: str = FIRST
 
     def __str__(self) -> str:
         return str(self.path)
@@ -57,6 +65,11 @@ class ModelFolder:
         """The file of all words."""
         return self.path / VOCABULARY
 
+    @property
+    def words(self) -> Path:
+        """The file of the dictionaries, in a folder of `learn`."""
+        return self.path / WORDS
+
     def place(self, place: str) -> PlaceFiles:
         """The files of a place."""
         return PlaceFiles(
@@ -65,6 +78,14 @@ class ModelFolder:
             self.path / "counts" / f"{place}.counts",
         )
 
+    def of(self, dictionary: str) -> "ModelFolder":
+        """The folder of one of the model's dictionaries; the first one's is the model's own."""
+        return ModelFolder(self.path / dictionary, dictionary) if dictionary else self
+
+    def describe(self, **changed: Any) -> None:
+        """Change what model.json says."""
+        ModelDescription.read(self.path / MODEL_JSON).write(**changed)
+
     def sentences(self, places: Sequence[str]) -> dict[str, Sentences]:
         """The sentences of each place; StreamError for a file that is missing or broken."""
         return {place: read_sentences(self.place(place).sentences) for place in places}
@@ -72,11 +93,88 @@ class ModelFolder:
 
 @dataclass(frozen=True)
 class PlaceModels:
-    """The language models of a MODEL/ folder, one per place in order, and what model.json says of them."""
+    """The language models of a MODEL/ folder, one per place in order, and what model.json says of them.
+
+    `further`: those of further dictionaries, by the dictionary's name.
+    """
 
     folder: ModelFolder
     models: Mapping[str, BackoffModel] = field(repr=False)
     description: "ModelDescription" = field(repr=False)
+    further: Mapping[str, "PlaceModels"] = field(default_factory=dict, repr=False)
+
+    @property
+    def dictionaries(self) -> dict[str, "PlaceModels"]:
+        """The models of each dictionary, by the dictionary's name; the first one's name is empty."""
+        return {FIRST: self, **self.further}
+
+    @property
+    def fingerprints(self) -> dict[str, str | None]:
+        """The fingerprint of each dictionary, None where it is unknown."""
+        return {name: models.description.dictionary for name, models in self.dictionaries.items()}
+
+
+@dataclass(frozen=True)
+class LearnedEvidence:
+    """How much words weigh, and what that was learned from: `evidence` in model.json.
+
+    `sequences`: how many there were to learn from. `frames`: how many of them are labelled with each place.
+    `dictionaries`: the fingerprint of each by name, None where it is unknown. `words`: whether the words were learned
+    anew for each group of sequences that was held out, too, and not models and transitions alone.
+    """
+
+    weights: Weights
+    sequences: int
+    frames: Mapping[str, int]
+    dictionaries: Mapping[str, str | None]
+    words: bool = False
+
+    def __str__(self) -> str:
+        weights = self.weights
+        chosen = f"alpha {weights.alpha:g}, memory {weights.memory:g}"
+        if weights.log_loss is None:
+            return f"{chosen}: {self.sequences} sequence, and none to choose by"
+        return (
+            f"{chosen}: log loss {weights.log_loss:.3f} on {weights.frames} frames of {self.sequences} sequences, "
+            "each group of them judged by the others"
+        )
+
+    @property
+    def shares(self) -> Floats:
+        """The places' shares of the training frames, float64 (C,)."""
+        return shares_of(np.array(list(self.frames.values()), np.int64))
+
+    def as_dict(self) -> dict[str, Any]:
+        """As model.json holds it."""
+        weights = self.weights
+        return {
+            "alpha": weights.alpha,
+            "memory": weights.memory,
+            "log_loss": weights.log_loss,
+            "judged": weights.frames,
+            "sequences": self.sequences,
+            "redone": "words, models, transitions" if self.words else "models, transitions",
+            "frames": dict(self.frames),
+            "dictionaries": {column_of(name): fingerprint for name, fingerprint in self.dictionaries.items()},
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], places: Sequence[str]) -> "LearnedEvidence":
+        """What `as_dict` gave; ValueError, KeyError, TypeError or AttributeError for anything else."""
+        loss = values["log_loss"]
+        weights = Weights(
+            float(values["alpha"]),
+            float(values["memory"]),
+            None if loss is None else float(loss),
+            _count(values["judged"]),
+        )
+        if not (0 < weights.alpha < math.inf and 0 <= weights.memory <= 1):
+            raise ValueError(weights)
+        frames = {place: _count(values["frames"][place]) for place in places}
+        dictionaries = {dictionary_in(column): fingerprint for column, fingerprint in values["dictionaries"].items()}
+        if next(iter(dictionaries), None) != FIRST or any(map(check_place, [*dictionaries][1:])):
+            raise ValueError(dictionaries)
+        return cls(weights, _count(values["sequences"]), frames, dictionaries, "words" in values["redone"])
 
 
 def load_model(path: Path | str) -> PlaceModels:
@@ -86,6 +184,25 @@ def load_model(path: Path | str) -> PlaceModels:
         raise ModelError(f"{folder}: is a file, and the folder of a model is expected; name the folder")
     if not folder.path.exists():
         raise ModelError(f"{folder}: no such model folder; `placerec train-lm TOKENS... -o {folder}` makes one")
+    first = _load(folder)
+    evidence = first.description.evidence
+    further = {name: _load(folder.of(name)) for name in [*evidence.dictionaries][1:]} if evidence else {}
+    for other in further.values():
+        if other.description.places != first.description.places:
+            raise ModelError(f"{other.folder}: has other places than {folder}; {_RETRAIN}")
+    return replace(first, further=further)
+
+
+def owned_by(path: Path) -> tuple[str, ...]:
+    """Patterns of what placerec wrote into a MODEL/ folder, if there is one: it may be replaced."""
+    try:
+        evidence = ModelDescription.read(path / MODEL_JSON).evidence
+    except PlacerecError:
+        evidence = None
+    return (*OWNED, *([*evidence.dictionaries][1:] if evidence else ()))
+
+
+def _load(folder: ModelFolder) -> PlaceModels:
     description = ModelDescription.read(folder.path / MODEL_JSON)
     models = {}
     for place in description.places:
@@ -170,6 +287,17 @@ class ModelDescription:
         return fingerprint
 
     @property
+    def evidence(self) -> LearnedEvidence | None:
+        """How much words weigh; None where nothing was learned of it, as in the paper: alpha is 1 then."""
+        values = self.values.get("evidence")
+        if values is None:
+            return None
+        try:
+            return LearnedEvidence.from_dict(values, self.places)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise ModelError(f"{self.path}: 'evidence' is not what training writes; {_RETRAIN}") from error
+
+    @property
     def added_count(self) -> float:
         """What the smoothing adds to every count; 1 for a smoothing that adds nothing."""
         return float(self.values["delta"]) if str(self.values["smoothing"]).startswith("lidstone") else 1.0
@@ -224,10 +352,9 @@ class ModelDescription:
         options = stored.get("options")
         return calibration, options if isinstance(options, Mapping) else {}
 
-    @property
-    def measured_distances(self) -> tuple[float, float] | None:
-        """Shift and variance of log2 distance, as the calibration measured them; None if it did not."""
-        stored = (self._stored() or {}).get("distances")
+    def measured_distances(self, dictionary: str = FIRST) -> tuple[float, float] | None:
+        """Shift and variance of log2 distance to words of a dictionary, as the calibration measured them, if it did."""
+        stored = (self._stored() or {}).get(column_of(dictionary).replace("word", "distances"))
         if stored is None:
             return None
         try:

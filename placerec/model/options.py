@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 from placerec.errors import ModelError
-from placerec.lm import smoothing
+from placerec.lm import BackoffModel, NgramCounts, estimate, smoothing, with_unigrams
 from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.version import __version__
 from placerec.words import Selection
 
@@ -39,11 +40,12 @@ class ModelOptions:
         """`delta`, or the default of the smoothing."""
         return default_delta(self.smoothing) if self.delta is None else self.delta
 
-    def signature(self, place: str, words: int) -> str:
-        """What made the model of a place over `words` words: the first line of its ARPA file."""
+    def signature(self, place: str, words: int, dictionary: str = "") -> str:
+        """What made the model of a place over `words` words, of a further `dictionary`: the ARPA file's first line."""
         delta = f" delta={self.delta_used:g}" if self.smoothing.startswith(("lidstone", "absolute")) else ""
         return (
-            f"placerec {__version__} place={place} order={self.order} smoothing={self.smoothing}{delta}"
+            f"placerec {__version__} place={place}{f' dictionary={dictionary}' if dictionary else ''}"
+            f" order={self.order} smoothing={self.smoothing}{delta}"
             f" select={self.select} min-count={','.join(map(str, self.min_count))}"
             f" markers={'yes' if self.markers else 'no'} vocab={words}"
         )
@@ -64,6 +66,14 @@ class ModelOptions:
                 f"-lm {place}.arpa",
             ]
         )
+
+
+def estimate_place(counts: NgramCounts, options: ModelOptions) -> BackoffModel:
+    """The language model of one place: V = all words of the counts' vocabulary."""
+    non_events = () if options.markers else (SENTENCE_END,)
+    rule = smoothing(options.smoothing, options.delta)
+    model = estimate(counts, rule, min_count=options.min_count, non_events=non_events)
+    return with_unigrams(model, (UNKNOWN, SENTENCE_START, SENTENCE_END))
 
 
 def parse_min_count(text: str) -> tuple[int, ...]:

@@ -67,22 +67,37 @@ class Record:
         return table
 
 
-def record_streams(streams: Iterable[tuple[WordStream, Mapping[str, Sentences]]], dictionary: str | None) -> Record:
-    """The record of token streams, each with its sentences per place; one stream at a time is in memory."""
-    learned: list[LearnedSequence] = []
-    routes: Counter[Route] = Counter()
-    distances: dict[str, Histogram] = {}
-    for stream, sentences in streams:
+class Recorder:
+    """Makes the record of token streams that come one after the other."""
+
+    def __init__(self) -> None:
+        self._learned: list[LearnedSequence] = []
+        self._routes: Counter[Route] = Counter()
+        self._distances: dict[str, Histogram] = {}
+
+    def add(self, stream: WordStream, sentences: Mapping[str, Sentences]) -> None:
+        """Take note of a stream and its sentences per place."""
         places = sorted(sentences)
-        learned.append(LearnedSequence(stream.name, {place: len(sentences[place]) for place in places}))
+        self._learned.append(LearnedSequence(stream.name, {place: len(sentences[place]) for place in places}))
         for counts in (place_steps(stream, places), place_triples(stream, places)):
             for at in np.argwhere(counts).tolist():
-                routes[tuple(places[i] for i in at)] += int(counts[tuple(at)])
+                self._routes[tuple(places[i] for i in at)] += int(counts[tuple(at)])
         labels = np.array(stream.places, np.str_)
         for place in places:
             histogram = distance_histogram(stream.distances[labels == place])
-            distances[place] = add_histograms(distances.get(place, {}), histogram)
-    return Record(tuple(learned), dictionary, routes, dict(sorted(distances.items())))
+            self._distances[place] = add_histograms(self._distances.get(place, {}), histogram)
+
+    def record(self, dictionary: str | None) -> Record:
+        """The record so far, of streams in the words of `dictionary`."""
+        return Record(tuple(self._learned), dictionary, self._routes, dict(sorted(self._distances.items())))
+
+
+def record_streams(streams: Iterable[tuple[WordStream, Mapping[str, Sentences]]], dictionary: str | None) -> Record:
+    """The record of token streams, each with its sentences per place; one stream at a time is in memory."""
+    recorder = Recorder()
+    for stream, sentences in streams:
+        recorder.add(stream, sentences)
+    return recorder.record(dictionary)
 
 
 def add_record(record: Record, new: Record) -> Record:

@@ -1,41 +1,28 @@
 """From sentences per place to a MODEL/ folder: one ARPA file per place, and all that made it, as text."""
 
 import logging
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from placerec.errors import LanguageModelError, ModelError
 from placerec.files import whole_folder, write_text
 from placerec.frames.places import check_place, check_twins
 from placerec.jobs import Executor, Progress
-from placerec.lm import (
-    BackoffModel,
-    NgramCounts,
-    count_ngrams,
-    estimate,
-    format_counts,
-    smoothing,
-    with_unigrams,
-    write_arpa,
-)
+from placerec.lm import NgramCounts, count_ngrams, format_counts, write_arpa
 from placerec.lm.counts import count_texts
-from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
-from placerec.model.corpus import gather_corpus
-from placerec.model.folder import OWNED, ModelDescription, ModelFolder
-from placerec.model.options import ModelOptions
+from placerec.lm.vocabulary import SENTENCE_END
+from placerec.model.corpus import dictionaries_in, gather_corpus, holds_sentences
+from placerec.model.evidence import learn_weights
+from placerec.model.folder import LearnedEvidence, ModelDescription, ModelFolder, owned_by
+from placerec.model.options import ModelOptions, estimate_place
 from placerec.model.record import Record
-from placerec.words import Sentences, each_sentence, format_sentences, write_vocabulary
+from placerec.words import Sentences, each_sentence, format_sentences, read_stream, write_vocabulary
+from placerec.words.folder import each_stream, stream_files
 
 NO_PLACE = "no labelled frame found: label the frames (places.lst, or one folder per place) to train"
 log = logging.getLogger(__name__)
-
-
-def estimate_place(counts: NgramCounts, options: ModelOptions) -> BackoffModel:
-    """The language model of one place: V = all words of the counts' vocabulary."""
-    non_events = () if options.markers else (SENTENCE_END,)
-    rule = smoothing(options.smoothing, options.delta)
-    model = estimate(counts, rule, min_count=options.min_count, non_events=non_events)
-    return with_unigrams(model, (UNKNOWN, SENTENCE_START, SENTENCE_END))
 
 
 def train_lm(
@@ -44,30 +31,53 @@ def train_lm(
     *,
     options: ModelOptions = ModelOptions(),
     vocabulary: Path | str | None = None,
+    as_in_paper: bool = False,
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
     """`placerec train-lm`: read token streams or sentences (see `gather_corpus`) and write a MODEL/ folder.
 
-    Memory holds the model of one place and one stream; the sentences go to their files as they are read. `work`: as for
-    `train_model`.
+    Of token streams with words of several dictionaries each gets its models, and how much all of them weigh is learned
+    (`learn_weights`). `as_in_paper`: the first dictionary alone, and nothing is learned of weights. Memory holds the
+    model of one place and one stream; the sentences go to their files as they are read. `work`: as for `train_model`.
     """
     options.check()
-    with whole_folder(Path(out), OWNED) as path:
+    names = dictionaries_in(tokens)[: 1 if as_in_paper else None]
+    with whole_folder(Path(out), owned_by(Path(out))) as path:
         folder = ModelFolder(path)
-        (path / "sentences").mkdir()
+        folders = {name: folder.of(name) for name in names}
+        for own in folders.values():
+            (own.path / "sentences").mkdir(parents=True)
 
-        def keep(place: str, text: Sentences) -> None:
-            with folder.place(place).sentences.open("ab") as file:
+        def keep(dictionary: str, place: str, text: Sentences) -> None:
+            with folders[dictionary].place(place).sentences.open("ab") as file:
                 file.write(format_sentences(text).encode())
 
-        words, record = gather_corpus(tokens, keep, selection=options.select, vocabulary=vocabulary)
-        if not record.places:
-            raise ModelError(NO_PLACE)
-        texts = {place: each_sentence(folder.place(place).sentences) for place in record.places}
-        counts = _counted(texts.values(), words, options, work)
-        write_model(folder, record.places, record.places, counts, words, options, record, progress)
+        gathered = gather_corpus(tokens, keep, selection=options.select, vocabulary=vocabulary, dictionaries=names)
+        for name, (words, record) in gathered.items():
+            if not record.places:
+                raise ModelError(NO_PLACE)
+            texts = {place: each_sentence(folders[name].place(place).sentences) for place in record.places}
+            counts = _counted(texts.values(), words, options, work)
+            write_model(folders[name], record.places, record.places, counts, words, options, record, progress)
+        evidence = None
+        if not as_in_paper and not holds_sentences(tokens):
+            evidence = _learn_evidence(tokens, gathered, options)
+            folder.describe(evidence=evidence.as_dict())
     log.info("%s: %d places, order %d, %s", out, len(texts), options.order, options.smoothing)
+    if evidence is not None:
+        log.info("%s", evidence)
+
+
+def _learn_evidence(
+    tokens: Sequence[Path | str], gathered: Mapping[str, tuple[Sequence[str], Record]], options: ModelOptions
+) -> LearnedEvidence:
+    files = stream_files(tokens)
+    vocabularies = {name: words for name, (words, _) in gathered.items()}
+    weights = learn_weights([partial(read_stream, path) for path in files], vocabularies, options)
+    fingerprints = {name: record.dictionary for name, (_, record) in gathered.items()}
+    frames = Counter(place for stream in each_stream(files) for place in stream.places if place)
+    return LearnedEvidence(weights, len(files), dict(sorted(frames.items())), fingerprints)
 
 
 def train_model(
@@ -87,7 +97,7 @@ def train_model(
     vocabulary lacks or a bad option.
     """
     _check(sentences, vocabulary, options)
-    with whole_folder(Path(out), OWNED) as path:
+    with whole_folder(Path(out), owned_by(Path(out))) as path:
         folder = ModelFolder(path)
         for place, text in sentences.items():
             write_text(folder.place(place).sentences, format_sentences(text))
@@ -132,7 +142,7 @@ def write_model(
         except LanguageModelError as error:
             raise LanguageModelError(f"place {place}: {error}") from error
         write_text(files.counts, format_counts(counted))
-        write_arpa(model, files.arpa, comment=options.signature(place, len(vocabulary)))
+        write_arpa(model, files.arpa, comment=options.signature(place, len(vocabulary), folder.dictionary))
         if progress:
             progress(done, len(estimated))
     ModelDescription.of(folder, places, len(vocabulary), options, record).write()

@@ -6,8 +6,9 @@ models of their places are estimated again; the files of other places stay as th
 
 import logging
 import shutil
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import accumulate, chain, pairwise
 from pathlib import Path
 
@@ -20,13 +21,13 @@ from placerec.lm import NgramCounts, count_ngrams
 from placerec.lm.counts import add_counts, read_counts, subtract_counts
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, Vocabulary
 from placerec.model.corpus import Corpus, holds_sentences, read_corpus
-from placerec.model.folder import MODEL_JSON, OWNED, ModelDescription, ModelFolder
+from placerec.model.folder import MODEL_JSON, TOKENS, WORDS, ModelDescription, ModelFolder, owned_by
 from placerec.model.options import ModelOptions
 from placerec.model.record import Record, add_record, take_away
 from placerec.model.train import write_model
 from placerec.words import format_sentences, read_vocabulary
-from placerec.words.folder import check_dictionary, stream_files
-from placerec.words.stream import stream_name
+from placerec.words.folder import check_dictionary, each_stream, stream_files
+from placerec.words.stream import FIRST, stream_name
 
 # The sentences of a place, as in its file.
 Lines = list[str]
@@ -65,37 +66,82 @@ def update(
     if not path.is_dir():
         raise ModelError(f"{path}: no such model folder; `placerec train-lm TOKENS... -o {path}` makes one")
     with held_folder(path):
-        old = _read_model(path)
-        new = _read_visits(tokens, old)
-        if not forget and _knows(old, new):
-            log.info("%s: has learned %s already; nothing is changed", path, ", ".join(new.record.names))
+        evidence = ModelDescription.read(path / MODEL_JSON).evidence
+        dictionaries = [*evidence.dictionaries] if evidence else [FIRST]
+        olds = [_read_model(ModelFolder(path).of(name)) for name in dictionaries]
+        news = [_read_visits(tokens, old) for old in olds]
+        names = ", ".join(news[0].record.names)
+        if not forget and all(map(_knows, olds, news)):
+            log.info("%s: has learned %s already; nothing is changed", path, names)
             return
-        record = _without(old, new.record) if forget else _with(old, new.record, tokens)
-        former = set(old.record.places)
-        changed = [place for place in record.places if new.sentences.get(place) or place not in former]
-        with whole_folder(path, OWNED) as made:
-            folder = ModelFolder(made)
-
-            def counted() -> Iterator[NgramCounts]:
-                for place in set(record.places) - set(changed):
-                    for source, target in zip(old.folder.place(place), folder.place(place), strict=True):
-                        shutil.copyfile(source, target)
-                for place in changed:
-                    lines, counts = _forgotten(old, new, place) if forget else _learned(old, new, place)
-                    write_text(folder.place(place).sentences, "".join(lines))
-                    yield counts
-
-            write_model(folder, record.places, changed, counted(), old.vocabulary, old.options, record, progress)
-    if old.calibrated:
+        with whole_folder(path, owned_by(path)) as made:
+            for old, new in zip(olds, news, strict=True):
+                folder = ModelFolder(made).of(old.folder.dictionary)
+                folder.path.mkdir(exist_ok=True)
+                changed = _write_changed(folder, old, new, tokens, forget, progress)
+            if evidence is not None:
+                frames = _added_frames(evidence.frames, tokens, forget)
+                ModelFolder(made).describe(evidence=replace(evidence, frames=frames).as_dict())
+            for name in (WORDS, TOKENS):
+                _copy(path / name, made / name)
+    if olds[0].calibrated:
         log.warning("%s: the calibration was of the former model, and is dropped; calibrate again", path)
-    verb, names = "forgotten" if forget else "learned", ", ".join(new.record.names)
-    log.info("%s: %s %s; estimated again: %s", path, verb, names, ", ".join(changed) or "nothing")
+    log.info(
+        "%s: %s %s; estimated again: %s",
+        path,
+        "forgotten" if forget else "learned",
+        names,
+        ", ".join(changed) or "nothing",
+    )
+    if evidence is not None:
+        log.info("%s: the weight of words stays as it was learned; train again to learn it anew", path)
 
 
-def _read_model(path: Path) -> _Model:
-    """What a MODEL/ folder says of itself, if its visits can be told apart and none of its files is missing."""
-    folder = ModelFolder(path)
-    description = ModelDescription.read(path / MODEL_JSON)
+def _write_changed(
+    folder: ModelFolder,
+    old: _Model,
+    new: Corpus,
+    tokens: Sequence[Path | str],
+    forget: bool,
+    progress: Progress | None,
+) -> list[str]:
+    """Write what a dictionary's models become into a new `folder`; the places whose models were estimated again."""
+    record = _without(old, new.record) if forget else _with(old, new.record, tokens)
+    former = set(old.record.places)
+    changed = [place for place in record.places if new.sentences.get(place) or place not in former]
+
+    def counted() -> Iterator[NgramCounts]:
+        for place in set(record.places) - set(changed):
+            for source, target in zip(old.folder.place(place), folder.place(place), strict=True):
+                shutil.copyfile(source, target)
+        for place in changed:
+            lines, counts = _forgotten(old, new, place) if forget else _learned(old, new, place)
+            write_text(folder.place(place).sentences, "".join(lines))
+            yield counts
+
+    write_model(folder, record.places, changed, counted(), old.vocabulary, old.options, record, progress)
+    return changed
+
+
+def _added_frames(frames: Mapping[str, int], tokens: Sequence[Path | str], forget: bool) -> dict[str, int]:
+    """The labelled frames of each place with those of `tokens` added, or taken away; places that are left with some."""
+    added = Counter(place for stream in each_stream(stream_files(tokens)) for place in stream.places if place)
+    total = Counter(frames)
+    total.update({place: -count if forget else count for place, count in added.items()})
+    return {place: count for place, count in sorted(total.items()) if count > 0}
+
+
+def _copy(source: Path, target: Path) -> None:
+    """A file or folder of files, if it is there."""
+    if source.is_dir():
+        shutil.copytree(source, target)
+    elif source.exists():
+        shutil.copyfile(source, target)
+
+
+def _read_model(folder: ModelFolder) -> _Model:
+    """What the models of a dictionary say of themselves, if their visits can be told apart and no file is missing."""
+    description = ModelDescription.read(folder.path / MODEL_JSON)
     record = description.record
     for file in (file for place in record.places for file in folder.place(place)):
         if not file.is_file():
@@ -111,9 +157,15 @@ def _read_visits(tokens: Sequence[Path | str], old: _Model) -> Corpus:
         kind = "token streams" if streams else "a folder of sentences"
         raise StreamError(f"{tokens[0]}: is not what {old.folder} was trained on; give {kind}")
     if streams:
-        check_dictionary(stream_files(tokens), old.record.dictionary, old.folder.path)
-    remedy = f"tokenize as {old.folder} was, or train a model on all words"
-    return read_corpus(tokens, selection=old.options.select, vocabulary=old.folder.vocabulary, remedy=remedy)
+        trained_on = {old.folder.dictionary: old.record.dictionary}
+        check_dictionary(stream_files(tokens), trained_on, old.folder.path)
+    return read_corpus(
+        tokens,
+        selection=old.options.select,
+        vocabulary=old.folder.vocabulary,
+        dictionary=old.folder.dictionary,
+        remedy=f"tokenize as {old.folder} was, or train a model on all words",
+    )
 
 
 def _knows(old: _Model, new: Corpus) -> bool:

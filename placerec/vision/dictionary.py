@@ -129,6 +129,11 @@ class Dictionary:
         units, distances = self.words(descriptor(image, self.spec)[None])
         return self.vocabulary[int(units[0])], float(distances[0])
 
+    def words_of(self, image: Gray) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """The word of one grey image and its distance, as `DictionarySet.words_of` gives them for several."""
+        word, distance = self.word_of(image)
+        return (word,), (distance,)
+
     def save(self, path: Path | str) -> None:
         """Write words.npz: arrays and a JSON string `meta`, no pickle; the same dictionary gives the same bytes."""
         write_dictionaries(Path(path), (self,))

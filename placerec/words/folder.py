@@ -1,13 +1,14 @@
 """The tokens folder: NAME.tsv, the token stream of a sequence; vocab.txt, all words; tokens.json, what made them.
 
-tokens.json has the fingerprint of the `dictionary` and the sequences that it was `trained_on`, for those who train and
-calibrate. Another tokeniser writes none.
+The words of a further dictionary are in vocab.DICTIONARY.txt. tokens.json has the fingerprint of the `dictionary`, or
+of all of them together, and the sequences that it was `trained_on`, for those who train and calibrate; of several
+`dictionaries` the fingerprint of each, by its column. Another tokeniser writes none.
 """
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,23 +16,41 @@ from placerec.errors import StreamError, at, refuse_string
 from placerec.files import all_lines, encoded, read_text, whole_folder, write_text
 from placerec.frames.naming import unique_names
 from placerec.version import __version__
-from placerec.words.stream import HEADER, WordStream, check_word, format_rows, read_stream, stream_name
+from placerec.words.stream import (
+    FIRST,
+    WordStream,
+    check_word,
+    column_of,
+    dictionary_in,
+    format_header,
+    format_rows,
+    read_stream,
+    stream_name,
+)
 
 if TYPE_CHECKING:
-    from placerec.vision import Dictionary
+    from placerec.vision import DictionarySet
 
 STREAM_SUFFIXES = (".tsv", ".tsv.gz")
 VOCABULARY, TOKENS_JSON = "vocab.txt", "tokens.json"
-OWNED = ("*.tsv", VOCABULARY, TOKENS_JSON)
+OWNED = ("*.tsv", VOCABULARY, "vocab.*.txt", TOKENS_JSON)
 
 
 @dataclass(frozen=True)
 class TokenMaker:
-    """The dictionary that made token streams, the sequences that it was learnt from, and a folder that says so."""
+    """The dictionary that made token streams, the sequences that it was learnt from, and a folder that says so.
+
+    `dictionaries`: of several the fingerprint of each, by name; `fingerprint` is that of all of them together.
+    """
 
     folder: Path
     fingerprint: str
     trained_on: frozenset[str] = frozenset()
+    dictionaries: Mapping[str, str] = field(default_factory=dict)
+
+    def of(self, dictionary: str) -> str | None:
+        """The fingerprint of a dictionary, None if it made no words."""
+        return (self.dictionaries or {FIRST: self.fingerprint}).get(dictionary)
 
 
 def is_stream(path: Path) -> bool:
@@ -87,9 +106,14 @@ def write_vocabulary(words: Iterable[str], path: Path | str) -> None:
     write_text(Path(path), "".join(f"{word}\n" for word in words))
 
 
-def find_vocabulary(folders: Iterable[Path]) -> Path:
-    """The vocab.txt in the first of `folders` that holds one; StreamError if none does."""
-    tried = list(dict.fromkeys(folder / VOCABULARY for folder in folders))
+def vocabulary_file(folder: Path, dictionary: str = FIRST) -> Path:
+    """Where a tokens folder has the words of a dictionary."""
+    return folder / (f"vocab.{dictionary}.txt" if dictionary else VOCABULARY)
+
+
+def find_vocabulary(folders: Iterable[Path], dictionary: str = FIRST) -> Path:
+    """The vocab.txt of a dictionary in the first of `folders` that holds one; StreamError if none does."""
+    tried = list(dict.fromkeys(vocabulary_file(folder, dictionary) for folder in folders))
     for path in tried:
         if path.exists():
             return path
@@ -111,14 +135,18 @@ def dictionary_of(files: Iterable[Path]) -> TokenMaker | None:
     return makers[0] if makers else None
 
 
-def check_dictionary(files: Iterable[Path], trained_on: str | None, model: Path) -> None:
-    """Raise StreamError if the token streams in `files` are known to be in other words than those of `model`."""
+def check_dictionary(files: Iterable[Path], trained_on: Mapping[str, str | None], model: Path) -> None:
+    """Raise StreamError if the token streams in `files` are known to be in other words than those of `model`.
+
+    `trained_on`: the fingerprint of each of the model's dictionaries, by its name; None where it is unknown.
+    """
     made_by = dictionary_of(files)
-    if made_by and trained_on and made_by.fingerprint != trained_on:
-        raise StreamError(
-            f"{made_by.folder}: its words are of another dictionary than those that trained {model}; "
-            "tokenize with the words.npz of the training"
-        )
+    for name, fingerprint in trained_on.items():
+        if made_by and fingerprint and made_by.of(name) not in (fingerprint, None):
+            raise StreamError(
+                f"{made_by.folder}: its words are of another dictionary than those that trained {model}; "
+                "tokenize with the words.npz of the training"
+            )
 
 
 def _maker(folder: Path) -> TokenMaker | None:
@@ -127,18 +155,22 @@ def _maker(folder: Path) -> TokenMaker | None:
         return None
     try:
         found = json.loads(read_text(path, StreamError))
-        return TokenMaker(folder, str(found["dictionary"]), frozenset(map(str, found.get("trained_on", ()))))
+        several = {
+            dictionary_in(column): str(fingerprint) for column, fingerprint in found.get("dictionaries", {}).items()
+        }
+        trained_on = frozenset(map(str, found.get("trained_on", ())))
+        return TokenMaker(folder, str(found["dictionary"]), trained_on, several)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StreamError(f"{path}: is no description of tokens; tokenize again") from error
 
 
-def write_tokens(streams: Iterable[WordStream], dictionary: "Dictionary", out: Path) -> None:
+def write_tokens(streams: Iterable[WordStream], dictionaries: "DictionarySet", out: Path) -> None:
     """Write the tokens folder `out`, whole or not at all."""
     with whole_folder(out, OWNED) as folder:
-        fill_folder(streams, dictionary, folder)
+        fill_folder(streams, dictionaries, folder)
 
 
-def fill_folder(parts: Iterable[WordStream], dictionary: "Dictionary", folder: Path) -> tuple[set[str], set[str]]:
+def fill_folder(parts: Iterable[WordStream], dictionaries: "DictionarySet", folder: Path) -> tuple[set[str], set[str]]:
     """Write pieces of token streams, those of a sequence in order, and what goes with them.
 
     Returns the names of the sequences and the words that were written.
@@ -148,15 +180,22 @@ def fill_folder(parts: Iterable[WordStream], dictionary: "Dictionary", folder: P
     for part in parts:
         path = folder / f"{part.name}.tsv"
         with path.open("ab") as file:
-            file.write(encoded(path, format_rows(part) if part.name in names else HEADER + format_rows(part)))
+            file.write(
+                encoded(path, format_rows(part) if part.name in names else format_header(part) + format_rows(part))
+            )
         names.add(part.name)
-        seen.update(part.words)
-    write_vocabulary(dictionary.vocabulary, folder / VOCABULARY)
-    description = {
+        seen.update(part.words, *(column.words for column in part.further.values()))
+    for dictionary in dictionaries.dictionaries:
+        write_vocabulary(dictionary.vocabulary, vocabulary_file(folder, dictionary.name))
+    description: dict[str, object] = {
         "format": "placerec tokens 1",
         "version": __version__,
-        "dictionary": dictionary.fingerprint,
-        "trained_on": list(dictionary.sequences),
+        "dictionary": dictionaries.fingerprint,
+        "trained_on": list(dictionaries.sequences),
     }
+    if len(dictionaries.dictionaries) > 1:
+        description["dictionaries"] = {
+            column_of(dictionary.name): dictionary.fingerprint for dictionary in dictionaries.dictionaries
+        }
     write_text(folder / TOKENS_JSON, json.dumps(description, indent=2) + "\n")
     return names, seen

@@ -2,16 +2,18 @@
 
 Grammar of `NAME.tsv` (UTF-8, LF, tabs; readers need only the column `word`, and accept more columns in any order)::
 
-    file  = "frame" TAB "time" TAB "place" TAB "word" TAB "distance" NL { line }
-    line  = name TAB [ seconds ] TAB [ place ] TAB word TAB [ distance ] NL
+    file  = "frame" TAB "time" TAB "place" TAB "word" TAB "distance" { more } NL { line }
+    more  = TAB "word." NAME TAB "distance." NAME
+    line  = name TAB [ seconds ] TAB [ place ] TAB word TAB [ distance ] { TAB word TAB [ distance ] } NL
 
-`time` is empty where the source has no time stamps, `place` where the frame has no label. Lines are in time order.
+`time` is empty where the source has no time stamps, `place` where the frame has no label. Lines are in time order. Of
+several dictionaries the first one has the columns `word` and `distance`, each further one columns with its NAME.
 A text of words without a header (separated by blanks or line ends) is read as a stream without times and labels.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -21,26 +23,39 @@ import numpy as np
 from placerec.arrays import Floats
 from placerec.errors import StreamError, at, refuse_string
 from placerec.files import all_lines, number_in, write_text
-from placerec.frames.places import checked_place
+from placerec.frames.places import check_place, checked_place
 from placerec.frames.table import FrameTable
 
 COLUMNS = ("frame", "time", "place", "word", "distance")
-HEADER = "\t".join(COLUMNS) + "\n"
+# The name of the first dictionary, and what columns of further ones begin with.
+FIRST, WORD, DISTANCE = "", "word.", "distance."
+# What a model's folder has beside the folders of its dictionaries.
+TAKEN = ("sentences", "counts", "tokens")
 # SRILM gives these a meaning of their own, and skips lines that start with ##.
 RESERVED = ("<s>", "</s>", "<unk>", "-pau-")
+
+
+@dataclass(frozen=True)
+class WordColumn:
+    """The words (n) of a sequence in a further dictionary, and their distances float64 (n,), nan where unknown."""
+
+    words: tuple[str, ...]
+    distances: Floats
 
 
 @dataclass(frozen=True, repr=False)
 class WordStream:
     """The words of one sequence: one per frame, in the order of the rows of `table`, which is that of time.
 
-    `distances` float64 (n,): from the descriptor to its unit, nan where unknown.
+    `distances` float64 (n,): from the descriptor to its unit, nan where unknown. `further`: the words in other
+    dictionaries than the first one, by the dictionary's name.
     """
 
     name: str
     table: FrameTable
     words: tuple[str, ...]
     distances: Floats
+    further: Mapping[str, WordColumn] = field(default_factory=dict)
 
     @staticmethod
     def of(
@@ -74,6 +89,13 @@ class WordStream:
             FrameTable.concat(part.table for part in parts),
             tuple(chain.from_iterable(part.words for part in parts)),
             np.concatenate([part.distances for part in parts]),
+            {
+                name: WordColumn(
+                    tuple(chain.from_iterable(part.further[name].words for part in parts)),
+                    np.concatenate([part.further[name].distances for part in parts]),
+                )
+                for name in parts[0].further
+            },
         )
 
     def __len__(self) -> int:
@@ -98,6 +120,16 @@ class WordStream:
         """The labels, "" where there is none."""
         return tuple(self.table.places)
 
+    @property
+    def dictionaries(self) -> tuple[str, ...]:
+        """The names of the dictionaries that the frames have words of; that of the first one is empty."""
+        return FIRST, *self.further
+
+    def in_dictionary(self, name: str) -> "WordStream":
+        """The stream with the words of one of `dictionaries` alone."""
+        column = self if name == FIRST else self.further[name]
+        return WordStream(self.name, self.table, column.words, column.distances)
+
     def renamed(self, name: str) -> "WordStream":
         """The stream as that of a sequence that is called `name`."""
         return replace(self, name=name, table=self.table.renamed(name))
@@ -110,20 +142,40 @@ def format_seconds(time: float) -> str:
 
 def write_stream(stream: WordStream, path: Path | str) -> None:
     """Write a token stream file, whole or not at all."""
-    write_text(Path(path), HEADER + format_rows(stream))
+    write_text(Path(path), format_header(stream) + format_rows(stream))
+
+
+def column_of(dictionary: str) -> str:
+    """The column that holds the words of a dictionary."""
+    return WORD + dictionary if dictionary else "word"
+
+
+def dictionary_in(column: str) -> str:
+    """The dictionary whose words a column holds."""
+    return FIRST if column == "word" else column.removeprefix(WORD)
+
+
+def format_header(stream: WordStream) -> str:
+    """The first line of a token stream file."""
+    more = (column + name for name in stream.further for column in (WORD, DISTANCE))
+    return "\t".join((*COLUMNS, *more)) + "\n"
 
 
 def format_rows(stream: WordStream) -> str:
     """The lines of a token stream file after its header; StreamError for a frame's name that a line cannot hold."""
     lines = []
-    for frame, time, place, word, distance in zip(
-        stream.frames, stream.times, stream.places, stream.words, stream.distances, strict=True
-    ):
+    owners: tuple[WordStream | WordColumn, ...] = (stream, *stream.further.values())
+    columns = (column for own in owners for column in _shown(own))
+    for frame, time, place, *words in zip(stream.frames, stream.times, stream.places, *columns, strict=True):
         if set(frame) & set("\t\n\r"):
             raise StreamError(f"{stream.name}: the frame {frame!r} holds a tab or a line end; rename the image")
-        shown = "" if math.isnan(distance) else f"{distance:.6g}"
-        lines.append(f"{frame}\t{format_seconds(time)}\t{place}\t{word}\t{shown}\n")
+        lines.append("\t".join((frame, format_seconds(time), place, *words)) + "\n")
     return "".join(lines)
+
+
+def _shown(column: WordStream | WordColumn) -> tuple[Sequence[str], Sequence[str]]:
+    """Words and distances as text."""
+    return column.words, ["" if math.isnan(distance) else f"{distance:.6g}" for distance in column.distances]
 
 
 def read_stream(path: Path | str) -> WordStream:
@@ -152,9 +204,21 @@ def read_stream(path: Path | str) -> WordStream:
             checked_place(path, i, place, StreamError)
     blank = [""] * len(rows)
     times = _numbers(path, line_numbers, "time", column.get("time", blank))
-    words = [check_word(path, i, word) for i, word in zip(line_numbers, column["word"], strict=True)]
-    distances = _numbers(path, line_numbers, "distance", column.get("distance", blank))
-    return WordStream.of(name, words, column.get("place"), frames=column.get("frame"), times=times, distances=distances)
+
+    def words_of(dictionary: str) -> WordColumn:
+        title = f"distance{dictionary}"
+        words = [check_word(path, i, word) for i, word in zip(line_numbers, column[f"word{dictionary}"], strict=True)]
+        return WordColumn(tuple(words), _numbers(path, line_numbers, title, column.get(title, blank)))
+
+    first = words_of("")
+    stream = WordStream.of(
+        name, first.words, column.get("place"), frames=column.get("frame"), times=times, distances=first.distances
+    )
+    further = [dictionary_in(title) for title in header if title.startswith(WORD)]
+    for dictionary in further:
+        if reason := "is taken" if dictionary in TAKEN else check_place(dictionary):
+            raise StreamError(at(path, 1, f"the name {dictionary!r} of a dictionary {reason}; rename the column"))
+    return replace(stream, further={dictionary: words_of(f".{dictionary}") for dictionary in further})
 
 
 def stream_name(path: Path) -> str:

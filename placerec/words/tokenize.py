@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from placerec.arrays import Ints, Singles
 from placerec.files import whole_folder
 from placerec.frames import SourceOptions, find_sequences
@@ -12,10 +14,10 @@ from placerec.frames.images import Batch
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal
-from placerec.vision import Descriptors, Dictionary, describe
+from placerec.vision import Descriptors, Dictionary, DictionarySet, describe
 from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
 from placerec.words.folder import OWNED, fill_folder
-from placerec.words.stream import WordStream
+from placerec.words.stream import WordColumn, WordStream
 
 log = logging.getLogger(__name__)
 
@@ -37,57 +39,68 @@ def tokenize(
     it. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes on from
     there.
     """
-    dictionary = Dictionary.load(Path(words))
+    dictionaries = DictionarySet.load(Path(words))
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
     with whole_folder(Path(out), OWNED) as folder, open_journal(Path(out)) as journal:
-        parts = _parts(sources, dictionary, matrix, source_options, work, journal, progress)
-        names, seen = fill_folder(parts, dictionary, folder)
-    log.info("%s: %d sequences, %d of %d words seen", out, len(names), len(seen), len(dictionary.vocabulary))
+        parts = _parts(sources, dictionaries, matrix, source_options, work, journal, progress)
+        names, seen = fill_folder(parts, dictionaries, folder)
+    listed = sum(len(dictionary.vocabulary) for dictionary in dictionaries.dictionaries)
+    log.info("%s: %d sequences, %d of %d words seen", out, len(names), len(seen), listed)
 
 
 def streams_of(
     sources: Iterable[Path | str],
-    dictionary: Dictionary,
+    dictionary: Dictionary | DictionarySet,
     *,
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> list[WordStream]:
-    """The token streams of image sources: each frame's best-matching unit in `dictionary`.
+    """The token streams of image sources: each frame's best-matching unit in `dictionary`, or in each of a set.
 
     `matrix`, `work`: see `tokenize`. Raises VisionError for a dictionary that needs a matrix if there is none.
     """
     pieces: dict[str, list[WordStream]] = {}
-    for part in _parts(sources, dictionary, matrix, source_options, work, None, progress):
+    for part in _parts(sources, DictionarySet.of(dictionary), matrix, source_options, work, None, progress):
         pieces.setdefault(part.name, []).append(part)
     return [WordStream.concat(parts) for parts in pieces.values()]
 
 
-def tokens_of(descriptors: Descriptors, dictionary: Dictionary) -> list[WordStream]:
+def tokens_of(descriptors: Descriptors, dictionary: Dictionary | DictionarySet) -> list[WordStream]:
     """The token streams of described frames, one per sequence."""
-    units, distances = dictionary.words(descriptors)
+    dictionaries = DictionarySet.of(dictionary)
+    found = dictionaries.words(descriptors)
     return [
-        _stream(descriptors.table.take(rows), dictionary, units[rows], distances[rows])
+        _stream(descriptors.table.take(rows), dictionaries, [(units[rows], far[rows]) for units, far in found])
         for rows in descriptors.table.by_sequence().values()
     ]
 
 
-def _stream(table: FrameTable, dictionary: Dictionary, units: Ints, distances: Singles) -> WordStream:
-    words = tuple(map(dictionary.vocabulary.__getitem__, units.tolist()))
-    return WordStream(table.sequences[0], table, words, distances.astype(float))
+def _stream(table: FrameTable, dictionaries: DictionarySet, found: Iterable[tuple[Ints, Singles]]) -> WordStream:
+    """The stream of a sequence; `found`: units and distances of its frames in each dictionary."""
+    first, *further = (
+        WordColumn(tuple(map(dictionary.vocabulary.__getitem__, units.tolist())), distances.astype(float))
+        for dictionary, (units, distances) in zip(dictionaries.dictionaries, found, strict=True)
+    )
+    named = dict(zip(dictionaries.names[1:], further, strict=True))
+    return WordStream(table.sequences[0], table, first.words, first.distances, named)
 
 
-def tokenize_batch(dictionary: Dictionary, batch: Batch) -> BatchResult:
-    """The units int64 (m,) and distances float32 (m,) of a batch's frames: a function of its arguments alone."""
-    found = describe_batch(dictionary.spec, batch)
-    units, distances = dictionary.words(found.arrays["values"])
-    return BatchResult(found.kept, found.blank, found.reasons, {"units": units, "distances": distances})
+def tokenize_batch(dictionaries: DictionarySet, batch: Batch) -> BatchResult:
+    """Of a batch's m frames the units int64 (m, D) and distances float32 (m, D) in each of D dictionaries.
+
+    A function of its arguments alone.
+    """
+    found = describe_batch(dictionaries.spec, batch)
+    units, distances = zip(*dictionaries.words(found.arrays["values"]), strict=True)
+    arrays = {"units": np.stack(units, axis=1), "distances": np.stack(distances, axis=1)}
+    return BatchResult(found.kept, found.blank, found.reasons, arrays)
 
 
 def _parts(
     sources: Iterable[Path | str],
-    dictionary: Dictionary,
+    dictionaries: DictionarySet,
     matrix: Path | str | None,
     source_options: SourceOptions,
     work: Executor | None,
@@ -98,20 +111,22 @@ def _parts(
     sequences = find_sequences(sources, options=source_options, endless=True)
     names = set()
     if matrix is not None:
-        parts = iter(tokens_of(describe(sequences, dictionary.spec, matrix=matrix), dictionary))
+        parts = iter(tokens_of(describe(sequences, dictionaries.spec, matrix=matrix), dictionaries))
     else:
         found = process_batches(
-            partial(tokenize_batch, dictionary),
+            partial(tokenize_batch, dictionaries),
             sequences,
-            dictionary.spec,
+            dictionaries.spec,
             FrameCounts(),
-            key=dictionary.fingerprint,
+            key=dictionaries.fingerprint,
             work=work,
             journal=journal,
             progress=progress,
         )
         parts = (
-            _stream(table, dictionary, arrays["units"], arrays["distances"]) for table, arrays in found if len(table)
+            _stream(table, dictionaries, zip(arrays["units"].T, arrays["distances"].T, strict=True))
+            for table, arrays in found
+            if len(table)
         )
     for part in parts:
         names.add(part.name)

@@ -232,12 +232,13 @@ def test_visits_are_learned_and_forgotten(world: Path, tmp_path: Path) -> None:
     before = (tmp_path / "model/hall.arpa").read_bytes()
     learned = done("update", tmp_path / "model", second)
     assert learned.stdout == ""
-    assert learned.stderr == f"{tmp_path / 'model'}: learned run2; estimated again: hall, kitchen, office\n"
+    stays = f"{tmp_path / 'model'}: the weight of words stays as it was learned; train again to learn it anew\n"
+    assert learned.stderr == f"{tmp_path / 'model'}: learned run2; estimated again: hall, kitchen, office\n{stays}"
     assert (tmp_path / "model/hall.arpa").read_bytes() == (world / "model/hall.arpa").read_bytes() != before
     again = done("update", tmp_path / "model", second).stderr
     assert again == f"{tmp_path / 'model'}: has learned run2 already; nothing is changed\n"
     forgotten = done("update", tmp_path / "model", second, "--forget").stderr
-    assert forgotten == f"{tmp_path / 'model'}: forgotten run2; estimated again: hall, kitchen, office\n"
+    assert forgotten == f"{tmp_path / 'model'}: forgotten run2; estimated again: hall, kitchen, office\n{stays}"
     assert (tmp_path / "model/hall.arpa").read_bytes() == before
     assert done("update", tmp_path / "model", second, "-q").stderr == ""
     misused("Missing argument 'TOKENS...'", "update", tmp_path / "model")

@@ -22,7 +22,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Tokens, a model, and transitions."""
     root = tmp_path_factory.mktemp("world")
     write_tokens(root / "tokens")
-    train_lm([root / "tokens/run1.tsv", root / "tokens/run2.tsv"], root / "model")
+    train_lm([root / "tokens/run1.tsv", root / "tokens/run2.tsv"], root / "model", as_in_paper=True)
     table = "\t".join(PLACES) + "\n0.9\t0.1\t0\n0.1\t0.8\t0.1\n0\t0.1\t0.9\n"
     (root / "steps.tsv").write_text(table)
     return root
@@ -190,7 +190,7 @@ def test_a_largest_gap_needs_times(world: Path) -> None:
 
 
 def test_second_order_needs_sequences(world: Path) -> None:
-    train_lm([world / "model/sentences"], world / "sentences", vocabulary=world / "tokens/vocab.txt")
+    train_lm([world / "model/sentences"], world / "sentences", vocabulary=world / "tokens/vocab.txt", as_in_paper=True)
     run = world / "tokens/run3.tsv", "-m", world / "sentences", "--method"
     assert decode(*run, "naive-bayes").exit_code == 0
     result = decode(*run, "second-order")

@@ -20,7 +20,7 @@ COMMAND = [sys.executable, "-m", "placerec"]
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("world")
     write_tokens(root / "tokens")
-    train_lm([root / "tokens"], root / "model")
+    train_lm([root / "tokens"], root / "model", as_in_paper=True)
     return root
 
 
@@ -105,7 +105,7 @@ def test_bytes_that_are_no_utf8_are_an_unknown_word(world: Path) -> None:
 def test_output_is_utf8_whatever_the_locale(tmp_path: Path, encoding: str) -> None:
     (tmp_path / "run.tsv").write_text("place\tword\nKüche\ta\nBüro\tb\n", encoding="utf-8")
     (tmp_path / "vocab.txt").write_text("a\nb\n")
-    train_lm([tmp_path / "run.tsv"], tmp_path / "mödel")
+    train_lm([tmp_path / "run.tsv"], tmp_path / "mödel", as_in_paper=True)
     done = run("decode", tmp_path / "run.tsv", "-m", tmp_path / "mödel", PYTHONIOENCODING=encoding, LC_ALL="C")
     assert done.returncode == 0, done.stderr
     assert done.stdout.decode().splitlines()[0].endswith("\tBüro\tKüche")

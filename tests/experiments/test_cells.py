@@ -37,7 +37,7 @@ def test_rows_are_those_of_the_commands(tmp_path: Path) -> None:
     tokens = [tmp_path / "tokens" / f"run{i}.tsv" for i in (1, 2, 3)]
     for row in results.rows:
         options = ModelOptions(order=row.order, smoothing=row.smoothing, select=parse_selection(row.select))
-        train_lm(tokens[:2], tmp_path / "model", options=options)
+        train_lm(tokens[:2], tmp_path / "model", options=options, as_in_paper=True)
         decode(tokens[2:], tmp_path / "model", out=tmp_path / "beliefs", options=TRANSITIONS[row.transition])
         found = evaluate_files([tmp_path / "beliefs"])
         assert (row.frames, row.accuracy) == (found.frames, found.accuracy)
@@ -62,7 +62,7 @@ def test_beliefs_are_those_of_decode_to_the_last_digit(tmp_path: Path) -> None:
     for cell in (GridCell("witten-bell", 3, "fixed"), GridCell("lidstone-backoff", 2, "learned")):
         job = CellJob(tokens[:2], tokens[2:], "compress:2", (cell,), 0.9, "frame", tmp_path / "kept.json")
         options = ModelOptions(order=cell.order, smoothing=cell.smoothing, select=parse_selection("compress:2"))
-        train_lm(tokens[:2], tmp_path / "model", options=options)
+        train_lm(tokens[:2], tmp_path / "model", options=options, as_in_paper=True)
         (wanted,) = decode(tokens[2:], tmp_path / "model", options=TRANSITIONS[cell.transition])
         (found,) = believe_cell(job, cell)
         assert np.array_equal(found.belief, wanted.belief)

@@ -61,7 +61,9 @@ def write_tokens(folder: Path, names: Sequence[str] = ("run1", "run2", "run3")) 
 def write_world(root: Path, names: Sequence[str] = ("run1", "run2", "run3"), **options: Any) -> Path:
     """`root` with the tokens of some runs, and a model, made with these options, of run1 and run2."""
     tokens = write_tokens(root / "tokens", names)
-    train_lm([tokens / "run1.tsv", tokens / "run2.tsv"], root / "model", options=ModelOptions(**options))
+    train_lm(
+        [tokens / "run1.tsv", tokens / "run2.tsv"], root / "model", options=ModelOptions(**options), as_in_paper=True
+    )
     return root
 
 

@@ -49,7 +49,7 @@ def test_the_numbers_are_those_of_the_filter_and_the_models(words: list[str], or
 
 def evidence(log10_p: Any, elapsed: Any) -> Evidence:
     n = len(log10_p)
-    return Evidence(np.ones(n, bool), np.arange(n), log10_p, elapsed)
+    return Evidence(np.ones(n, bool), np.arange(n), log10_p[None], elapsed)
 
 
 def both(log10_p: Any, transition: Transition, elapsed: Any) -> tuple[Any, Any]:
@@ -66,7 +66,7 @@ def test_contributions_are_the_derivatives_of_the_odds(
     T = len(rows)
     elapsed = np.array(data.draw(st.lists(st.integers(0, 3), min_size=T, max_size=T)), float)
     pair = np.tile([2, 0], (T, 1))
-    found = contributions(evidence(log10_p, elapsed), transition, *both(log10_p, transition, elapsed), pair)
+    (found,) = contributions(evidence(log10_p, elapsed), transition, *both(log10_p, transition, elapsed), pair)
     nudge = 1e-4
     for s in range(T):
         odds = []
@@ -82,7 +82,9 @@ def test_without_changes_of_place_contributions_are_likelihood_ratios() -> None:
     rng = np.random.default_rng(0)
     log10_p, elapsed = -rng.random((30, 2)), np.ones(30)
     still = Transition(np.eye(2))
-    found = contributions(evidence(log10_p, elapsed), still, *both(log10_p, still, elapsed), np.tile([0, 1], (30, 1)))
+    (found,) = contributions(
+        evidence(log10_p, elapsed), still, *both(log10_p, still, elapsed), np.tile([0, 1], (30, 1))
+    )
     ratios = log10_p[:, 0] - log10_p[:, 1]
     for t in range(30):
         assert found[t] == pytest.approx([ratios[t - k] if k <= t else 0 for k in range(WINDOW)], abs=1e-9)

@@ -23,7 +23,9 @@ def world(tmp_path: Path) -> Path:
 
 
 def test_selection_is_applied_at_test_too(world: Path) -> None:
-    train_lm([world / "tokens"], world / "model", options=ModelOptions(select=Selection("subsample", 3)))
+    train_lm(
+        [world / "tokens"], world / "model", options=ModelOptions(select=Selection("subsample", 3)), as_in_paper=True
+    )
     (beliefs,) = decode([world / "tokens/run3.tsv"], world / "model")
     assert beliefs.selected.tolist() == [i % 3 == 0 for i in range(60)]
     assert (beliefs.belief[1] == beliefs.belief[0]).all()
@@ -104,7 +106,7 @@ def lines_of(world: Path, text: str, *, as_json: bool = False) -> list[str]:
 @pytest.mark.parametrize("rule", ["none", "subsample:3", "compress:2", "unique"])
 def test_a_stream_is_answered_as_the_file_is(world: Path, rule: str) -> None:
     options = ModelOptions(3, select=parse_selection(rule))
-    train_lm([world / "tokens/run1.tsv", world / "tokens/run2.tsv"], world / "model", options=options)
+    train_lm([world / "tokens/run1.tsv", world / "tokens/run2.tsv"], world / "model", options=options, as_in_paper=True)
     stream = read_stream(world / "tokens/run3.tsv")
     text = "".join(f"{word}\t{time}\n" for word, time in zip(stream.words, stream.times, strict=True))
     (beliefs,) = decode([world / "tokens/run3.tsv"], world / "model")

@@ -63,7 +63,7 @@ def test_wu2009_is_one_word_at_a_time(training: TrainingSet) -> None:
 def test_wu2009_is_order_1_to_the_byte(extra: tuple[str, ...], delta: float | None, tmp_path: Path) -> None:
     tokens = write_tokens(tmp_path / "tokens")
     runs = [tokens / "run1.tsv", tokens / "run2.tsv"]
-    train_lm(runs, tmp_path / "model", options=ModelOptions(1, "lidstone-backoff", delta))
+    train_lm(runs, tmp_path / "model", options=ModelOptions(1, "lidstone-backoff", delta), as_in_paper=True)
     args = ("decode", tokens, "-m", tmp_path / "model", *extra)
     for out, method in (("a", ()), ("b", ("--method", "wu2009"))):
         done(*args, *method, "-o", tmp_path / out)
@@ -74,8 +74,8 @@ def test_wu2009_is_order_1_to_the_byte(extra: tuple[str, ...], delta: float | No
 def test_wu2009_does_not_depend_on_the_models(tmp_path: Path) -> None:
     tokens = write_tokens(tmp_path / "tokens")
     runs = [tokens / "run1.tsv", tokens / "run2.tsv"]
-    train_lm(runs, tmp_path / "one", options=ModelOptions(1, "lidstone-backoff"))
-    train_lm(runs, tmp_path / "two", options=ModelOptions(2, "witten-bell"))
+    train_lm(runs, tmp_path / "one", options=ModelOptions(1, "lidstone-backoff"), as_in_paper=True)
+    train_lm(runs, tmp_path / "two", options=ModelOptions(2, "witten-bell"), as_in_paper=True)
     [expected] = decode([tokens / "run3.tsv"], tmp_path / "one")
     [found] = decode([tokens / "run3.tsv"], tmp_path / "two", method="wu2009")
     np.testing.assert_array_equal(found.belief, expected.belief)

@@ -91,7 +91,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     tokens = write_tokens(root / "tokens")
     for select in ("none", "unique"):
         options = ModelOptions(select=Selection(select))
-        train_lm([tokens / "run1.tsv", tokens / "run2.tsv"], root / select, options=options)
+        train_lm([tokens / "run1.tsv", tokens / "run2.tsv"], root / select, options=options, as_in_paper=True)
     return root
 
 

@@ -38,7 +38,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_images(root / "runs" / name, seed)
     train_dictionary([root / "runs"], root / "words.npz", options=DictionaryOptions(size=3))
     tokenize([root / "runs"], root / "words.npz", root / "tokens")
-    train_lm([root / "tokens/seq1.tsv"], root / "model")
+    train_lm([root / "tokens/seq1.tsv"], root / "model", as_in_paper=True)
     return root
 
 

@@ -46,8 +46,8 @@ def main(root: Path, exchange: str) -> None:
     write_vocabulary(["a", "b"], root / "vocab.txt")
     write_stream(WordStream.of("first", [*"aabba"], ["hall", "hall", "hall", "kitchen", "kitchen"]), root / "first.tsv")
     write_stream(WordStream.of("today", [*"bba"], ["hall"] * 3), root / "today.tsv")
-    train_lm([root / "first.tsv"], root / "old")
-    train_lm([root / "first.tsv", root / "today.tsv"], root / "new")
+    train_lm([root / "first.tsv"], root / "old", as_in_paper=True)
+    train_lm([root / "first.tsv", root / "today.tsv"], root / "new", as_in_paper=True)
     if exchange == "moves":
         files._swap = lambda first, second: False
     found = {"old": 0, "new": 0, "absent": 0, "steps": 0}

@@ -15,7 +15,7 @@ from placerec.errors import ModelError, StreamError
 from placerec.hohmm import format_beliefs, read_beliefs
 from placerec.methods import decode, decode_lines
 from placerec.model import Decoding, calibrate, load_model, load_recognizer, train_lm, update
-from placerec.model.decoding import unknown_model_of
+from placerec.model.decoding import unknown_models_of
 from placerec.words import WordStream, read_stream, write_stream
 
 ASKED = Decoding(unknown=True)
@@ -33,7 +33,7 @@ def world(tmp_path: Path) -> Path:
     for seed, name in enumerate(("run1", "run2", "run3", "far")):
         stream = with_distances(run_through(name, seed), seed, 3.0 if name == "far" else 1.0)
         write_stream(stream, tmp_path / f"tokens/{name}.tsv")
-    train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model")
+    train_lm([tmp_path / "tokens/run1.tsv", tmp_path / "tokens/run2.tsv"], tmp_path / "model", as_in_paper=True)
     return tmp_path
 
 
@@ -104,14 +104,14 @@ def test_a_stream_may_leave_out_what_it_does_not_know(world: Path) -> None:
 def test_after_an_update_it_is_that_of_training_on_all(world: Path) -> None:
     update(world / "model", [world / "tokens/run3.tsv"])
     learned = unknown(world, "far")
-    train_lm([world / f"tokens/run{number}.tsv" for number in (1, 2, 3)], world / "model")
+    train_lm([world / f"tokens/run{number}.tsv" for number in (1, 2, 3)], world / "model", as_in_paper=True)
     assert np.array_equal(unknown(world, "far"), learned)
 
 
 def test_what_calibrate_measured_replaces_the_estimate(world: Path) -> None:
     estimated = unknown(world, "far")
     calibrate(world / "model", [world / "tokens/far.tsv"])
-    model = unknown_model_of(load_model(world / "model"))
+    (model,) = unknown_models_of(load_model(world / "model"))
     stored = json.loads((world / "model/model.json").read_text())["calibration"]["distances"]
     assert model.distance is not None
     assert model.distance.variance == pytest.approx(stored["variance"] + 0.09)

@@ -48,7 +48,7 @@ def write_run(path: Path, frames: Sequence[tuple[str, str, float, float]]) -> Pa
 
 
 def trained(runs: Sequence[Path], out: Path, options: ModelOptions) -> dict[str, str]:
-    train_lm(runs, out, options=options, vocabulary=runs[0].parent / "vocab.txt")
+    train_lm(runs, out, options=options, vocabulary=runs[0].parent / "vocab.txt", as_in_paper=True)
     return contents(out)
 
 
@@ -163,7 +163,7 @@ def test_a_place_with_visits_but_no_selected_word_stays(tmp_path: Path) -> None:
 
 
 def test_a_folder_of_sentences_is_learned_and_forgotten_under_its_name(world: Path) -> None:
-    train_lm([world / "model/sentences"], world / "text")
+    train_lm([world / "model/sentences"], world / "text", as_in_paper=True)
     before = contents(world / "text")
     (world / "visits").mkdir()
     (world / "visits/hall.txt").write_text("w01 w02\nw03\n")
@@ -184,7 +184,7 @@ def test_a_calibration_is_dropped_with_a_warning(world: Path, caplog: pytest.Log
     path.write_text(path.read_text().replace('"calibration": null', '"calibration": {"temperature": 2}'))
     update(world / "model", [world / "tokens/run3.tsv"])
     assert f"{world / 'model'}: the calibration was of the former model, and is dropped; calibrate again" in caplog.text
-    train_lm([world / "tokens"], world / "all")
+    train_lm([world / "tokens"], world / "all", as_in_paper=True)
     assert contents(world / "model") == contents(world / "all")
 
 
@@ -230,7 +230,7 @@ def test_a_sequence_is_not_learned_under_two_names(world: Path) -> None:
     both = world / "new/run2.tsv", world / "tokens/run2.tsv"
     refused(world, f"run2: {world / 'model'} has learned a sequence of this name; rename", *both)
     shutil.copy(world / "tokens/vocab.txt", world / "new/vocab.txt")
-    train_lm(both, world / "model")
+    train_lm(both, world / "model", as_in_paper=True)
     refused(world, f"tokens-run2: {world / 'model'} has learned a sequence of this name; rename", both[1])
     update(world / "model", both)
 
@@ -265,7 +265,7 @@ def test_words_of_another_dictionary_are_refused(tmp_path: Path) -> None:
     for name, fingerprint in (("a", "f00"), ("b", "ba4"), ("c", "f00")):
         write_tokens(tmp_path / name, [name])
         (tmp_path / name / "tokens.json").write_text(json.dumps({"dictionary": fingerprint}))
-    train_lm([tmp_path / "a"], tmp_path / "model")
+    train_lm([tmp_path / "a"], tmp_path / "model", as_in_paper=True)
     refused(tmp_path, "b: its words are of another dictionary than those", tmp_path / "b", error=StreamError)
     update(tmp_path / "model", [tmp_path / "c"])
     assert json.loads((tmp_path / "model/model.json").read_text())["dictionary"] == "f00"

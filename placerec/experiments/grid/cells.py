@@ -17,7 +17,7 @@ from placerec.experiments.grid.splits import Fold
 from placerec.experiments.store import WordsJob, load, save
 from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, learned_transition
 from placerec.hohmm.decoder import warn_of_unlisted
-from placerec.hohmm.evidence import evidence_in
+from placerec.hohmm.evidence import DictionaryModels, evidence_in
 from placerec.hohmm.posterior import posterior
 from placerec.lm import NgramCounts, count_ngrams
 from placerec.lm.arpa import as_printed
@@ -26,6 +26,7 @@ from placerec.lm.trie import Trie
 from placerec.model import Corpus, ModelOptions, estimate_place, read_corpus
 from placerec.words import Selection, WordStream, parse_selection, place_steps
 from placerec.words.folder import read_streams
+from placerec.words.stream import FIRST
 
 # What is kept of an evaluation, beside counts for every sequence.
 KEPT = ("frames", "accuracy", "balanced_accuracy", "majority_accuracy", "change_latency_frames", "log_loss", "ece")
@@ -111,7 +112,7 @@ def _computed(job: CellJob, cells: Sequence[GridCell]) -> dict[str, Any]:
     streams = _read(job, cells)
     listed = frozenset(streams.corpus.vocabulary)
     for stream in streams.tests:
-        warn_of_unlisted(stream, listed)
+        warn_of_unlisted(stream, {FIRST: listed})
     results: dict[str, Any] = {"data": describe_data(streams.training, streams.tests)}
     for smoothing in dict.fromkeys(cell.smoothing for cell in cells):
         results[f"frame-wise {smoothing}"] = _frame_wise(streams, smoothing)
@@ -124,7 +125,8 @@ def _believed(job: CellJob, streams: _Streams, cells: Sequence[GridCell]) -> Ite
     selection = parse_selection(job.select)
 
     def filtered(stream: WordStream, union: Emissions, way: Transition) -> Beliefs:
-        evidence = next(evidence_in(stream, union, listed, selection=selection, per=way.per, max_gap=None))
+        models = DictionaryModels(FIRST, union, listed)
+        evidence = next(evidence_in(stream, [models], selection=selection, per=way.per, max_gap=None))
         belief, _ = posterior(evidence, way)
         return Beliefs.of(stream, places, belief, selected=evidence.selected)
 
