@@ -318,6 +318,29 @@ def size_option(default: int) -> Callable[[Command], Command]:
     return click.option("--size", type=click.IntRange(2, 200), default=default, help=text)
 
 
+def listed(item: "click.ParamType[Any]") -> Callable[[click.Context, click.Parameter, str], tuple[Any, ...]]:
+    """A callback that reads values with commas between them, none of them twice, as a tuple."""
+
+    def parse(ctx: click.Context, param: click.Parameter, value: str) -> tuple[Any, ...]:
+        values = tuple(item.convert(each.strip(), param, ctx) for each in value.split(","))
+        twice = [each for number, each in enumerate(values) if each in values[:number]]
+        if twice:
+            raise click.BadParameter(f"{twice[0]} is named twice", ctx, param)
+        return values
+
+    return parse
+
+
+def as_in_paper(text: str, **values: str) -> Callable[[Command], Command]:
+    """--as-in-paper: other defaults for some options, by the names of their parameters; what is given wins."""
+
+    def preset(ctx: click.Context, param: click.Parameter, chosen: bool) -> None:
+        if chosen:
+            ctx.default_map = {**(ctx.default_map or {}), **values}
+
+    return click.option("--as-in-paper", is_flag=True, is_eager=True, expose_value=False, callback=preset, help=text)
+
+
 def seed_option(text: str) -> Callable[[Command], Command]:
     """--seed: 0 or above, 0 by default."""
     return click.option("--seed", type=click.IntRange(min=0), default=0, help=text)
@@ -326,6 +349,14 @@ def seed_option(text: str) -> Callable[[Command], Command]:
 def words_option(required: bool, text: str) -> Callable[[Command], Command]:
     """-w: the visual dictionary."""
     return click.option("-w", "--words", metavar="words.npz", type=PATH, required=required, help=text)
+
+
+def dictionary_option(function: Command) -> Command:
+    """--dictionary: one of the file's. The command gets `name`."""
+    text = "Which dictionary, if train-words learned several: pn20, for instance.  [default: the first]"
+    return click.option(
+        "--dictionary", "name", metavar="NAME", callback=lambda ctx, param, value: value or "", help=text
+    )(function)
 
 
 def output_option(metavar: str, text: str, required: bool = True) -> Callable[[Command], Command]:
@@ -376,10 +407,11 @@ def decoding_options(function: Command) -> Command:
         type=FiniteRange(0, 1),
         help="The share of the belief that each step forgets.  [default: as learned, else 0]",
     )
-    @click.option(
-        "--as-in-paper",
-        is_flag=True,
-        help="What is not given is as in the paper: fixed transitions, alpha 1, memory 0.",
+    @as_in_paper(
+        "What is not given is as in the paper: --transition fixed --alpha 1 --memory 0.",
+        transition="fixed",
+        alpha="1",
+        memory="0",
     )
     @click.option(
         "--max-gap",
@@ -392,16 +424,15 @@ def decoding_options(function: Command) -> Command:
         "--lag", metavar="N", type=click.IntRange(0), help="Let the words up to N frames later count for each frame."
     )
     @functools.wraps(function)
-    def decoding(*args: Any, as_in_paper: bool, **options: Any) -> Any:
+    def decoding(*args: Any, **options: Any) -> Any:
         from dataclasses import fields
 
-        from placerec.model.decoding import Decoding
-        from placerec.model.decoding import as_in_paper as completed
+        from placerec.model import Decoding
 
         try:
             chosen = Decoding(**{one.name: options.pop(one.name) for one in fields(Decoding) if one.name in options})
         except PlacerecError as error:
             raise click.UsageError(str(error)) from error
-        return function(*args, options=completed(chosen) if as_in_paper else chosen, **options)
+        return function(*args, options=chosen, **options)
 
     return decoding
