@@ -17,6 +17,8 @@ _PURPOSES = {
     "compute-best-mix": "SRILM's tool: weights for a mixture of models.",
     "change-lm-vocab": "SRILM's tool: change a model's vocabulary.",
     "add-ppls": "SRILM's tool: add up ngram -ppl outputs.",
+    "disambig": "SRILM's tool: find hidden words behind words.",
+    "hidden-ngram": "SRILM's tool: find events between words.",
 }
 
 
@@ -27,6 +29,8 @@ EXAMPLES = {
     "compute-best-mix": "a.ppl b.ppl",
     "change-lm-vocab": "-vocab words.txt -lm train.lm -write-lm new.lm",
     "add-ppls": "monday.ppl tuesday.ppl",
+    "disambig": "-map frames.map -text frames.txt -lm places.lm",
+    "hidden-ngram": "-text stream.txt -lm events.lm -hidden-vocab events.txt",
 }
 
 

@@ -57,7 +57,7 @@ def handling_of(options: Mapping[str, Any], **others: Any) -> Handling:
 class Sentences(NamedTuple):
     """Lines as SRILM's word numbers (T,), lengths (S,), weights (S,); `shown`: their words, if `verbose`.
 
-    `escapes`: the number of the sentence that comes next, and the line.
+    `escapes`: the number of the sentence that comes next, and the line. `places`: line numbers, if `verbose`.
     """
 
     numbers: Ints
@@ -65,6 +65,7 @@ class Sentences(NamedTuple):
     weights: "Numbers"
     shown: Sequence[str] = ()
     escapes: Sequence[tuple[int, str]] = ()
+    places: Sequence[int] = ()
 
 
 def read_sentences(lines: Lines, words: WordList, handling: Handling) -> Iterator[Sentences]:
@@ -124,7 +125,7 @@ class _Numbering:
 def _read_carefully(lines: Lines, blocks: Iterable[bytes], words: WordList, handling: Handling) -> Iterator[Sentences]:
     number = words.number if handling.adding else words.known
     numbers: list[int] = []
-    kept: list[tuple[int, float, str]] = []
+    kept: list[tuple[int, float, str, int]] = []
     escapes: list[tuple[int, str]] = []
     for line in lines.of(physical for block in blocks for physical in BytesIO(block)):
         if len(numbers) + len(kept) >= _BATCH:
@@ -144,15 +145,16 @@ def _read_carefully(lines: Lines, blocks: Iterable[bytes], words: WordList, hand
         else:
             numbers += map(number, found)
             mark = f"{weight:g}* " if handling.weight else ""
-            kept.append((len(found), weight, mark + " ".join(found) if handling.verbose else ""))
+            kept.append((len(found), weight, mark + " ".join(found) if handling.verbose else "", lines.number))
     yield _sentences(numbers, kept, escapes)
 
 
 def _sentences(
-    numbers: Sequence[int], kept: Sequence[tuple[int, float, str]], escapes: Sequence[tuple[int, str]]
+    numbers: Sequence[int], kept: Sequence[tuple[int, float, str, int]], escapes: Sequence[tuple[int, str]]
 ) -> Sentences:
-    lengths, weights, shown = zip(*kept, strict=True) if kept else ((), (), ())
-    return Sentences(np.array(numbers, np.int64), np.array(lengths, np.int64), np.array(weights), shown, escapes)
+    lengths, weights, shown, places = zip(*kept, strict=True) if kept else ((), (), (), ())
+    columns = np.array(numbers, np.int64), np.array(lengths, np.int64), np.array(weights)
+    return Sentences(*columns, shown, escapes, places)
 
 
 def joined(parts: Sequence[Sentences]) -> Sentences:

@@ -9,7 +9,16 @@ import signal
 import sys
 from collections.abc import Sequence
 
-TOOLS = ("ngram-count", "ngram", "ngram-merge", "compute-best-mix", "change-lm-vocab", "add-ppls")
+TOOLS = (
+    "ngram-count",
+    "ngram",
+    "ngram-merge",
+    "compute-best-mix",
+    "change-lm-vocab",
+    "add-ppls",
+    "disambig",
+    "hidden-ngram",
+)
 _INTERRUPTED = 130
 
 
