@@ -46,13 +46,13 @@ class Scatter:
         """How far, of 0 to 1, the covariance is to be drawn towards its mean variance in every direction.
 
         What Ledoit and Wolf (2004, A well-conditioned estimator for large-dimensional covariance matrices) find best,
-        and k / n at least.
+        and so far at least that k / n of the mean variance stands beside the whole of the covariance.
         """
         k = len(self.scatter)
         square = float(np.square(self.covariance).sum())
         far = square - k * float(self._mean_variance) ** 2
         noise = max((self.fourth / self.n - square) / self.n, 0.0)
-        return max(min(noise, far) / far if far > 0 else 0.0, min(k / self.n, 1.0))
+        return max(min(noise, far) / far if far > 0 else 0.0, k / (self.n + k))
 
     def shrunk(self) -> Floats:
         """The covariance (k, k) drawn towards its mean variance as far as `shrinkage` tells."""

@@ -79,7 +79,7 @@ def test_the_shrinkage_is_that_of_ledoit_and_wolf(n: int) -> None:
     far = np.square(covariance - mean * np.eye(WIDTH)).sum() / WIDTH
     noise = sum(np.square(np.outer(row, row) - covariance).sum() / WIDTH for row in apart) / len(apart) ** 2
     best = min(noise, far) / far
-    assert found.shrinkage() == pytest.approx(max(best, WIDTH / len(apart)), rel=1e-9)
+    assert found.shrinkage() == pytest.approx(max(best, WIDTH / (WIDTH + len(apart))), rel=1e-9)
     drawn = (1 - found.shrinkage()) * covariance + found.shrinkage() * mean * np.eye(WIDTH)
     np.testing.assert_allclose(found.shrunk(), drawn, rtol=1e-9, atol=1e-12)
 
@@ -99,7 +99,7 @@ def test_the_shrinkage_is_that_of_scikit_learn() -> None:
 
 def test_few_frames_shrink_it_whatever_they_look_like() -> None:
     covariance = np.diag([100.0, 1, 1, 1])
-    for n, share in ((3, 1), (8, 0.5), (400, 0.01)):
+    for n, share in ((4, 0.5), (12, 0.25), (396, 0.01)):
         assert Scatter(n, 2, covariance * n, n * np.square(covariance).sum()).shrinkage() == share
 
 
