@@ -210,10 +210,10 @@ def _commands(scale: str, seed: int) -> str:
     return "\n".join(
         [
             f"placerec lab lab/ --scale {scale} --seed {seed}",
-            f"placerec train-words lab/seq*[12] -o words.npz --seed {seed}",
+            f"placerec train-words lab/seq*[12] --as-in-paper -o words.npz --seed {seed}",
             "placerec show-words words.npz lab/seq*3 -o words.png",
             "placerec tokenize lab/ -w words.npz -o tokens/",
-            "placerec train-lm tokens/*[12].tsv -o model/ --order 2",
+            "placerec train-lm tokens/*[12].tsv --as-in-paper -o model/ --order 2",
             "placerec decode tokens/*3.tsv -m model/ -o beliefs/",
             "placerec evaluate beliefs/*.tsv --plot beliefs.png",
         ]

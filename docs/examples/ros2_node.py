@@ -16,7 +16,7 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Float64MultiArray, String
 
-from placerec import Dictionary, PlacerecError, load_recognizer
+from placerec import DictionarySet, PlacerecError, load_recognizer
 
 
 class WhichPlace(Node):
@@ -24,7 +24,7 @@ class WhichPlace(Node):
 
     def __init__(self, model: str, words: str) -> None:
         super().__init__("which_place")
-        self.recognizer = load_recognizer(model, dictionary=Dictionary.load(words))
+        self.recognizer = load_recognizer(model, dictionary=DictionarySet.load(words))
         self.best = self.create_publisher(String, "place", 1)
         self.belief = self.create_publisher(Float64MultiArray, "belief", 1)
         # The newest image only: those that come while one is worked on are dropped.

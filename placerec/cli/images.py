@@ -33,7 +33,7 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
     "--views",
     metavar="VIEW,...",
     callback=shared.listed(click.Choice(["plain", "pn"])),
-    default="plain",
+    default="plain,pn",
     help="What maps see: principal components (plain), or these by how little the frames of one place differ (pn).",
 )
 @click.option(
@@ -42,7 +42,7 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
     "sizes",
     metavar="N,...",
     callback=shared.listed(click.IntRange(2, 200)),
-    default="10",
+    default="10,20",
     help="Sides of the maps: a dictionary of size x size words for each, in every view.",
 )
 @shared.as_in_paper(

@@ -56,7 +56,7 @@ def train_dictionary(
     spec: DescriptorSpec | None = None,
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
-    options: DictionarySetOptions | DictionaryOptions = DictionaryOptions(),
+    options: DictionarySetOptions | DictionaryOptions = DictionarySetOptions(),
     held_out: Iterable[Path | str] = (),
     work: Executor | None = None,
     progress: Progress | None = None,

@@ -10,7 +10,7 @@ from helpers.typed_commands import done, fails, make_words, misused
 
 from placerec.frames import read_gray
 from placerec.model import load_recognizer
-from placerec.vision import Dictionary
+from placerec.vision import DictionarySet
 from placerec.words import read_stream
 
 
@@ -71,7 +71,7 @@ def test_centrist_words_go_all_the_way(world: Path, tmp_path: Path) -> None:
         done("decode", world / "runs/seq2", "-m", model, "-w", words, "-q").stdout
         == done("decode", tokens / "seq2.tsv", "-m", model, "-q").stdout
     )
-    recognizer = load_recognizer(model, dictionary=Dictionary.load(words))
+    recognizer = load_recognizer(model, dictionary=DictionarySet.load(words))
     frame = sorted((world / "runs/seq2/std_cam").iterdir())[0]
     assert recognizer.update(read_gray(frame)).word == read_stream(tokens / "seq2.tsv").words[0]
     done("describe", world / "runs", "-o", tmp_path / "d.npz", *args)

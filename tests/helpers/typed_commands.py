@@ -8,7 +8,7 @@ from click.testing import CliRunner, Result
 from helpers.small_world import write_images
 from placerec.cli import commands
 
-SMALL = ("--size", 3, "--image-size", 16, "-q")
+SMALL = ("--as-in-paper", "--size", 3, "--image-size", 16, "-q")
 
 
 def placerec(*args: object, stdin: str | bytes | None = None) -> Result:

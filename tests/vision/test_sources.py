@@ -56,7 +56,8 @@ def test_held_out_frames_train_nothing_and_are_measured(tmp_path: Path, caplog: 
 def test_the_command_says_what_came_of_it(tmp_path: Path) -> None:
     write_images(tmp_path / "run1", seed=1)
     out = tmp_path / "words.npz"
-    options = ["--size", "3", "--image-size", "32", "--rule", "online", "--width", "0.4", "--epochs", "4"]
+    options = ["--as-in-paper", "--size", "3", "--image-size", "32"]
+    options += ["--rule", "online", "--width", "0.4", "--epochs", "4"]
     held_out = ["--held-out", str(tmp_path / "run1"), "--held-out", str(write_images(tmp_path / "run2"))]
     result = done("train-words", tmp_path / "run1", "-o", out, *options, *held_out)
     made = Dictionary.load(out)

@@ -287,7 +287,7 @@ def commands_of(plan: Config, setting: Setting, job: GridJob) -> str:
         sources = [[_from(plan, one.sequence.source) for one in part] for part in (job.images.train, job.images.test)]
         words = f"-o words.npz --size {setting.size} --seed {job.seed} --units {plan.units}"
         lines += [
-            f"placerec train-words {_listed(sources[0])} {words}",
+            f"placerec train-words {_listed(sources[0])} --as-in-paper {words}",
             f"placerec tokenize {_listed(sources[0] + sources[1])} -w words.npz -o {tokens}/",
         ]
     else:
@@ -297,7 +297,7 @@ def commands_of(plan: Config, setting: Setting, job: GridJob) -> str:
     learned = setting.transition == "learned"
     steps = "--transition learned" if learned else f"--stay {plan.stay:g} --per {plan.per}"
     lines += [
-        f"placerec train-lm {train} -o model/ {model}",
+        f"placerec train-lm {train} --as-in-paper -o model/ {model}",
         f"placerec decode {test} -m model/ -o beliefs/ {steps}",
         "placerec evaluate beliefs/",
     ]
