@@ -30,7 +30,8 @@ class FirstSeen:
 
     def positions(self, trie: Trie) -> list[Ints]:
         """Per order, when each row was first seen, int64 (m_n,)."""
-        _, sorted_number = self.words.sorted()
+        # Words may have been added since the n-grams were counted.
+        sorted_number = trie.vocabulary.ids([word or "" for word in self.words.words])
         first = [np.full(len(keys), NEVER) for keys in trie.keys]
         now = 0
         for table in self.tables:

@@ -1,12 +1,12 @@
 """Counts files: section 4.2 of our SRILM specification."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from placerec.srilm.text.numbers import bounded_int, leading_float
-from placerec.srilm.text.streams import Streams, tokens
+from placerec.srilm.text.streams import Lines, Streams, tokens
 
 if TYPE_CHECKING:
     from placerec.lm.counts import NgramCounts
@@ -98,10 +98,17 @@ def count_lines(
 ) -> Iterator[tuple[list[str], float]]:
     """The n-grams of a counts file and their counts, at most `most`; a malformed line is reported and ends the file."""
     lines = streams.lines(name)
-    for line in lines:
+    yield from counted(lines, lines, fractional, most=most)
+
+
+def counted(
+    lines: Lines, rest: Iterable[str], fractional: bool, *, most: int = 2**63 - 1
+) -> Iterator[tuple[list[str], float]]:
+    """What `count_lines` has of a file, from the lines that are left of one."""
+    for line in rest:
         ngram, count = split_count(line, fractional, most=most)
         if count is None:
-            streams.say(f"{lines.position}{MALFORMED}")
+            lines.streams.say(f"{lines.position}{MALFORMED}")
             return
         yield ngram, count
 
@@ -110,8 +117,13 @@ def read_counts(
     name: str, order: int, words: "WordList", streams: Streams, *, fractional: bool, limited: bool = False
 ) -> Table:
     """The n-grams up to `order` of a counts file; with `limited`, those with a word that is not listed are left out."""
+    return tabled(count_lines(name, fractional, streams), order, words, limited=limited)
+
+
+def tabled(counts: Iterable[tuple[list[str], float]], order: int, words: "WordList", *, limited: bool = False) -> Table:
+    """The table of n-grams up to `order` and their counts; `limited`: without words that are not listed."""
     table = Table()
-    for ngram, count in count_lines(name, fractional, streams):
+    for ngram, count in counts:
         if len(ngram) > order:
             continue
         if limited and any(words.normal(word) not in words.index for word in ngram):

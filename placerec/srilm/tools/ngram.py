@@ -95,7 +95,8 @@ OPTIONS: Options = {
     **_refuse(
         "tagged models are not specified", tagged="flag", decipher="flag", multiwords="flag", multi_char="string"
     ),
-    **_refuse("count models are not specified", count_lm="flag", msweb_lm="string"),
+    "count-lm": Option("flag", False, "-lm is a count model"),
+    **_refuse("models on servers are not specified", msweb_lm="string"),
     **_refuse(
         "servers are not specified",
         use_server="string", server_port="unsigned", server_maxclients="unsigned", cache_served_ngrams="flag",

@@ -80,6 +80,10 @@ OPTIONS: Options = {
     "kn-counts-modified": Option("flag", False, "the counts are Kneser-Ney's already"),
     "kn-modify-counts-at-end": Option("flag", False, "change counts after the discounts are estimated"),
     **_method_options(),
+    "count-lm": Option("flag", False, "estimate the weights of a count model"),
+    "init-lm": Option("string", None, "the count model to begin with"),
+    "em-iters": Option("unsigned", 100, "so many steps at most for -count-lm"),
+    "em-delta": Option("float", 0.001, "the change in log likelihood at which -count-lm ends"),
     "read-google": Option("string", None, "counts in Google's folders are not specified", refused=True),
     "skip": Option("flag", False, "skip n-gram models are not specified", refused=True),
     "varprune": Option("float", 0.0, "variance pruning is not specified", refused=True),
@@ -100,6 +104,13 @@ def _run(options: Parsed, streams: Streams) -> None:
         raise SrilmError("conflicting default discounting options", 2)
     words = _read_vocabulary(options, streams)
     counts, first = _read_all(options, words, streams)
+    if options["count-lm"] and options["lm"] is not None:
+        # Not needed by those who count.
+        from placerec.srilm.tools.count_lm import write_count_model
+
+        write_count_model(options, counts, words, first, streams)
+        _write_rest(options, counts, words, first, streams)
+        return
     vocabulary = counts.trie.vocabulary
     meta = meta_occurrences(vocabulary.words, options["meta-tag"])
     meta_words = np.array([words.is_meta(word) for word in vocabulary.words], bool)

@@ -11,10 +11,11 @@ from placerec.lm.mutable import MutableModel, reweigh, unite
 from placerec.lm.prune import prune, prune_improbable
 from placerec.lm.score import TokenSequence
 from placerec.srilm.model.arpa import read_model, tables_of
+from placerec.srilm.model.count_models import CountModel, format_count_model, read_count_model
 from placerec.srilm.model.mixed_scorers import Cached, Lenient, LogLinear, Mixture
 from placerec.srilm.model.scorers import Model, Null, Scorer
 from placerec.srilm.order.messages import ContextTimes, Messages, message_order
-from placerec.srilm.text.streams import Streams
+from placerec.srilm.text.streams import SrilmError, Streams
 from placerec.srilm.text.vocabulary import WordList
 from placerec.srilm.tools.options import Parsed
 
@@ -30,19 +31,34 @@ class Models:
         self.words = words
         self.mutable: MutableModel | None = None
         self.times: ContextTimes | None = None
+        self.counted: CountModel | None = None
 
     def scorer(self) -> Scorer:
         """What scores: sections 9.2 to 9.6, in this order."""
         if self.options["null"]:
             scorer: Scorer = partial(Null, self.words)
         else:
-            self.mutable, self.times = self.read("lm", "lm file")
-            scorer = self.mixed()
+            scorer = self.counting() if self.options["count-lm"] else self.backing_off()
             if self.options["cache"]:
                 self.mutable = None
                 scorer = partial(Cached, scorer, self.words, self.options["cache"], self.options["cache-lambda"])
         scorer = self.lenient(scorer)
         return self.rescored(scorer) if self.options["rescore-ngram"] else scorer
+
+    def backing_off(self) -> Scorer:
+        """The back-off model of -lm, and what is mixed with it."""
+        self.mutable, self.times = self.read("lm", "lm file")
+        return self.mixed()
+
+    def counting(self) -> Scorer:
+        """The count model of -lm (-count-lm)."""
+        options, name = self.options, self.options["lm"]
+        for other in ("mix-lm", "renorm", "prune", "prune-lowprobs", "skipoovs"):
+            if options[other]:
+                raise SrilmError(f"-{other} needs a back-off model; leave it or -count-lm out", 2)
+        failure, limited = f"format error in count-lm file{name}", options["limit-vocab"]
+        self.counted = read_count_model(name, self.words, self.streams, self.order, failure, limited=limited)
+        return self.counted
 
     def read(
         self, option: str, what: str, *, order: int | None = None, words: WordList | None = None
@@ -157,6 +173,10 @@ class Models:
     def write(self, name: str) -> None:
         """`-write-lm`."""
         mutable = self.mutable
+        if self.counted and not self.options["rescore-ngram"]:
+            with self.streams.output(name) as file:
+                file.writelines(text.encode("latin-1") for text in format_count_model(self.counted, whole=True))
+            return
         if mutable is None:
             self.streams.write(name, "")
             self.streams.say("write() method not implemented")
