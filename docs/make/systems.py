@@ -98,8 +98,8 @@ def table(folder: Path, found: Comparison) -> str:
     lines = [
         f"{folder.name}: {found.frames} test frames, {number} {what}; always `{found.majority_place}`: "
         f"{100 * found.majority:.1f} %; {front}\n",
-        "| method | accuracy % | 95 % interval | balanced % | latency | ECE | µs a frame |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| method | accuracy % | 95 % interval | balanced % | latency | ECE | log loss | µs a frame |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for score in sorted(found.scores, key=lambda score: -score.accuracy):
         latency = "–" if score.change_latency_frames is None else f"{score.change_latency_frames:.1f}"
@@ -108,7 +108,7 @@ def table(folder: Path, found: Comparison) -> str:
         lines.append(
             f"| `{score.method}`{asked} | {100 * score.accuracy:.1f} | {low:.1f} to {high:.1f} "
             f"| {100 * score.balanced_accuracy:.1f} | {latency} "
-            f"| {score.ece:.3f} | {score.microseconds_per_frame:.0f} |"
+            f"| {score.ece:.3f} | {score.log_loss:.2f} | {score.microseconds_per_frame:.0f} |"
         )
     return "\n".join(lines) + "\n\n"
 

@@ -121,7 +121,7 @@ def evaluate(beliefs: Sequence[Beliefs]) -> Evaluation:
         changes=len(latencies),
         change_latency_frames=float(np.median(latencies)) if len(latencies) else None,
         reliability=reliability(confidence, right),
-        log_loss=float(-np.log(np.maximum(evidence, _SMALLEST_BELIEF)).mean()),
+        log_loss=max(0.0, float(-np.log(np.maximum(evidence, _SMALLEST_BELIEF)).mean())),
         risk_coverage=risk_coverage(confidence, right),
         new_places=_new_places(beliefs),
         sequences={s.name: _sequence_score(t, r) for s, t, r in zip(beliefs, truths, rights, strict=True)},

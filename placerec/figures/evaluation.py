@@ -25,6 +25,7 @@ from placerec.figures.canvas import (
     place_colours,
     write_line,
 )
+from placerec.frames.doubts import warn_of_still_sequences, warn_of_strange_labels
 from placerec.frames.naming import unique_names
 from placerec.frames.table import Labels
 from placerec.hohmm.beliefs import UNKNOWN_PLACE, Beliefs, parse_beliefs, read_beliefs
@@ -203,7 +204,8 @@ def _square(axes: "Axes", title: str, across: str, up: str) -> None:
 def evaluate_files(sources: Iterable[Path | str], *, plot: Path | str | None = None) -> Evaluation:
     """Judge beliefs files, folders of them, or standard input (`-`) by their true places; `plot` gets the picture.
 
-    Files of one name are called by their folders too. Raises EvaluationError for what cannot be read or judged, and
+    Files of one name are called by their folders too. A warning tells of test sequences that all hold one place
+    throughout, and of labels that no column has. Raises EvaluationError for what cannot be read or judged, and
     what `plot_evaluation` raises.
     """
     if plot is not None:
@@ -213,6 +215,9 @@ def evaluate_files(sources: Iterable[Path | str], *, plot: Path | str | None = N
     names = unique_names([(one.name, path) for one, path in zip(beliefs, paths, strict=True)], EvaluationError)
     beliefs = [replace(one, stream=one.stream.renamed(name)) for one, name in zip(beliefs, names, strict=True)]
     evaluation = evaluate(beliefs)
+    warn_of_still_sequences(one.truth for one in beliefs)
+    columns = dict.fromkeys(place for one in beliefs for place in (*one.places, UNKNOWN_PLACE))
+    warn_of_strange_labels((one.truth for one in beliefs), [*columns], any(one.unknown is not None for one in beliefs))
     if plot is not None:
         plot_evaluation(beliefs, evaluation, plot)
     return evaluation

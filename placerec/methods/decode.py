@@ -3,12 +3,13 @@
 import json
 import logging
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from placerec.errors import ModelError, OutputError, StreamError, at
 from placerec.files import number_in, whole_folder, write_text
 from placerec.frames import SourceOptions
+from placerec.frames.doubts import warn_of_strange_labels, warn_of_training
 from placerec.hohmm import Belief, Recognizer, SequenceDecoder
 from placerec.hohmm.beliefs import BeliefRow, Beliefs, format_beliefs, format_header, format_json_row, format_row
 from placerec.hohmm.explain import EXPLAINED
@@ -17,7 +18,7 @@ from placerec.methods.decoders import HOHMM, make_decoder
 from placerec.model import Decoding, PlaceModels, load_model
 from placerec.model.decoding import AS_LEARNED, token_streams
 from placerec.words import WordStream
-from placerec.words.folder import is_stream
+from placerec.words.folder import dictionary_of, is_stream, stream_files
 
 OWNED = ("*.tsv", "*.jsonl")
 log = logging.getLogger(__name__)
@@ -40,32 +41,39 @@ def decode(
 
     `sources`: token streams, or image sources (`source_options`), whose words come from `words` (a words.npz; by
     default that in `model`). Without `out` there must be one sequence only; explanations are written there, as
-    NAME.explain.jsonl. `method`: one of `METHODS`. Raises ModelError or StreamError for what cannot be read or does not
-    belong together.
+    NAME.explain.jsonl. `method`: one of `METHODS`. Labelled sequences that trained words or models are named in a
+    warning, and so are labels that the models do not know. Raises ModelError or StreamError for what cannot be read or
+    does not belong together.
     """
 
     def opened() -> tuple[SequenceDecoder, list[WordStream]]:
         models = load_model(model)
         path = words or (models.folder.words if _are_images(sources, models) else None)
         if path is None:
-            return make_decoder(method, models, options=options, scorer=scorer), token_streams(sources, models)
-        # Only images need OpenCV and scipy.
-        from placerec.vision import DictionarySet
-        from placerec.words.tokenize import streams_of
+            decoder = make_decoder(method, models, options=options, scorer=scorer)
+            streams, maker = token_streams(sources, models), dictionary_of(stream_files(sources))
+            trained: Collection[str] = maker.trained_on if maker else ()
+        else:
+            # Only images need OpenCV and scipy.
+            from placerec.vision import DictionarySet
+            from placerec.words.tokenize import streams_of
 
-        for source in sources:
-            if is_stream(Path(source)):
-                raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {path} out")
-        dictionary = DictionarySet.load(path)
-        decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
-        return decoder, streams_of(sources, dictionary, source_options=source_options, progress=progress)
+            for source in sources:
+                if is_stream(Path(source)):
+                    raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {path} out")
+            dictionary = DictionarySet.load(path)
+            decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
+            streams = streams_of(sources, dictionary, source_options=source_options, progress=progress)
+            trained = dictionary.sequences
+        if out is None and len(streams) > 1:
+            raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
+        _doubt(streams, models, trained, options)
+        return decoder, streams
 
     if out is None:
         if options.explain:
             raise ModelError("explanations are files: name a folder for them with -o")
         decoder, streams = opened()
-        if len(streams) > 1:
-            raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
         return [_decoded(decoder, stream, options) for stream in streams]
     _spare_sources(sources, Path(out))
     found = []
@@ -93,6 +101,15 @@ def _are_images(sources: Sequence[Path | str], models: PlaceModels) -> bool:
 
 def _holds_streams(path: Path) -> bool:
     return path.is_dir() and any(map(is_stream, path.iterdir()))
+
+
+def _doubt(
+    streams: Sequence[WordStream], models: PlaceModels, trained_words: Collection[str], options: Decoding
+) -> None:
+    labelled = [stream.name for stream in streams if any(stream.places)]
+    warn_of_training([name for name in labelled if name in models.description.trained_on], "models")
+    warn_of_training([name for name in labelled if name in trained_words], "words")
+    warn_of_strange_labels((stream.places for stream in streams), [*models.models], options.unknown)
 
 
 def _decoded(decoder: SequenceDecoder, stream: WordStream, options: Decoding) -> Beliefs:

@@ -60,7 +60,7 @@ METHODS: dict[str, Method] = {
     "second-order": Method(fit=second_order.fit),
 }
 # What words alone do not tell; `compare` runs these.
-NEED_DESCRIPTORS = ("torralba2003", "pronobis2007", "ullah2008", "knn")
+NEED_DESCRIPTORS = ("torralba2003", "pronobis2007", "ullah2008", "knn", "logistic", "rbf-svm")
 
 
 class StepDecoder(SequenceDecoder):

@@ -6,13 +6,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask
-from placerec.hohmm import Transition
+from placerec.hohmm import Transition, learned_transition
 from placerec.hohmm.filter import filter_step, normalised
 from placerec.hohmm.prediction import predictor
 from placerec.lm.logs import LN10
 
 # A point float64 (k,) in, its belief float64 (C,) out; on-line, so that a belief depends on no later point.
 PointStepFunction = Callable[[Floats], Floats]
+# Fits such a function to a training set; log likelihoods, for instance, or a machine's scores.
+FitPoints = Callable[["DescriptorTrainingSet"], PointStepFunction]
 # Begins a sequence.
 MakePointStepper = Callable[[], PointStepFunction]
 MOST_FOLDS = 10
@@ -34,18 +36,18 @@ class DescriptorTrainingSet:
     steps: Ints = field(repr=False)
 
 
-def held_out_folds(sequences: Ints) -> Iterator[Mask]:
+def held_out_folds(sequences: Ints, most: int = MOST_FOLDS) -> Iterator[Mask]:
     """Which frames to hold out, bool (n,), fold by fold, given the number of each frame's sequence, int64 (n,).
 
-    A fold is one sequence, or each tenth one where there are more than ten.
+    A fold is one sequence, or each tenth one where there are more than ten; `most`: another number than ten.
 
     Of a single sequence its tenths: the frames beside them are near, so that they flatter what is fitted on the rest.
     """
     numbers = np.unique(sequences)
     if len(numbers) == 1:
-        group = np.arange(len(sequences)) * MOST_FOLDS // len(sequences)
+        group = np.arange(len(sequences)) * most // len(sequences)
     else:
-        group = np.searchsorted(numbers, sequences) % MOST_FOLDS
+        group = np.searchsorted(numbers, sequences) % most
     for held in np.unique(group):
         mask: Mask = group == held
         yield mask
@@ -75,3 +77,8 @@ def filtered(log_likelihoods: Callable[[Floats], Floats], transition: Transition
         return step
 
     return make_stepper
+
+
+def through_filter(training: DescriptorTrainingSet, likelihoods: FitPoints) -> MakePointStepper:
+    """Beliefs of the filter over `likelihoods` that are fitted to the training, with its transitions."""
+    return filtered(likelihoods(training), learned_transition(training.steps))

@@ -19,7 +19,15 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Mask
 from placerec.hohmm import Transition, filter_stream, learned_transition
 from placerec.lm.logs import LN10
-from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper, filtered, held_out_folds, scattered
+from placerec.methods.descriptors import (
+    DescriptorTrainingSet,
+    FitPoints,
+    MakePointStepper,
+    PointStepFunction,
+    held_out_folds,
+    scattered,
+    through_filter,
+)
 
 PROTOTYPES = 100
 # Widths that are tried, in units of the root mean square distance of the training frames from their mean. Wide ones
@@ -40,10 +48,18 @@ class Prototypes:
 
 def fit(training: DescriptorTrainingSet, *, prototypes: int = PROTOTYPES, seed: int = 0) -> MakePointStepper:
     """Beliefs of the mixtures in the filter; `prototypes` a place at most, drawn by `seed`."""
-    transition = learned_transition(training.steps)
+    return through_filter(training, choose(training, prototypes=prototypes, seed=seed))
+
+
+def choose(training: DescriptorTrainingSet, *, prototypes: int = PROTOTYPES, seed: int = 0) -> FitPoints:
+    """What fits log likelihoods of a point, float64 (C,), of the width that the training asks for."""
     width = best_width(training, prototypes, seed)
-    chosen = draw_prototypes(training, np.ones(len(training.truth), bool), prototypes, seed)
-    return filtered(_density(chosen, width, len(training.places)), transition)
+
+    def likelihoods(learned: DescriptorTrainingSet) -> PointStepFunction:
+        drawn = draw_prototypes(learned, np.ones(len(learned.truth), bool), prototypes, seed)
+        return _density(drawn, width, len(learned.places))
+
+    return likelihoods
 
 
 def draw_prototypes(training: DescriptorTrainingSet, among: Mask, most: int, seed: int) -> Prototypes:

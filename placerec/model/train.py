@@ -131,6 +131,8 @@ def write_model(
     for name in ("sentences", "counts"):
         (folder.path / name).mkdir(exist_ok=True)
     write_vocabulary(vocabulary, folder.vocabulary)
+    if len(places) == 1:
+        log.warning("%s is the only place, and will be recognised wherever the camera is; label others, too", places[0])
     if not options.markers:
         write_text(folder.path / "nonevents.txt", SENTENCE_END + "\n")
     for done, (counted, place) in enumerate(zip(counts, estimated, strict=True), start=1):

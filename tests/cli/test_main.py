@@ -76,7 +76,7 @@ def test_a_reader_that_has_enough_is_no_error(world: Path) -> None:
 def test_a_full_disk_is_told(world: Path) -> None:
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run(
-            [*COMMAND, "decode", str(world / "tokens/run1.tsv"), "-m", str(world / "model")],
+            [*COMMAND, "decode", "-q", str(world / "tokens/run1.tsv"), "-m", str(world / "model")],
             stdout=full,
             stderr=subprocess.PIPE,
         )

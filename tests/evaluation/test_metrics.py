@@ -116,6 +116,9 @@ def test_no_belief_in_the_true_place_is_clipped() -> None:
     # Belief 0 in B, and D, which has no column: both -ln 1e-15 = 34.5388.
     result = evaluate([sequence("BD", "AA", [[1, 0, 0], [1, 0, 0]])])
     assert result.log_loss == pytest.approx(15 * math.log(10))
+    # What is sure and right costs 0, and not -0.
+    sure = evaluate([sequence("AB", "AB", np.array([[1.0, 0, 0], [0, 1 + 1e-15, 0]]))])
+    assert str(sure.log_loss) == "0.0"
 
 
 def test_calibration_error_of_a_case_worked_by_hand() -> None:

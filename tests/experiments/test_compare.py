@@ -26,9 +26,10 @@ for package in ("sklearn", "matplotlib"):
     pytest.importorskip(package)
 
 COLUMNS = (
-    "method,accuracy,accuracy_low,accuracy_high,balanced_accuracy,change_latency_frames,ece,microseconds_per_frame"
+    "method,accuracy,accuracy_low,accuracy_high,balanced_accuracy,"
+    "change_latency_frames,ece,microseconds_per_frame,log_loss"
 )
-METHODS = ("hohmm", "majority", "pronobis2007", "torralba2003", "ullah2008", "knn")
+METHODS = ("hohmm", "majority", "pronobis2007", "torralba2003", "ullah2008", "knn", "logistic-hmm@pn")
 TIMINGS = ("microseconds_per_frame",)
 
 
@@ -75,6 +76,7 @@ def test_every_method_has_a_line_with_what_evaluate_says(done: tuple[Path, Compa
         assert float(row["accuracy"]) == pytest.approx(evaluation.accuracy, abs=1e-6)
         assert float(row["balanced_accuracy"]) == pytest.approx(evaluation.balanced_accuracy, abs=1e-6)
         assert float(row["ece"]) == pytest.approx(evaluation.ece, abs=1e-6)
+        assert float(row["log_loss"]) == pytest.approx(evaluation.log_loss, abs=1e-6)
         assert float(row["change_latency_frames"]) == evaluation.change_latency_frames
         assert float(row["accuracy_low"]) <= float(row["accuracy"]) <= float(row["accuracy_high"])
         assert float(row["microseconds_per_frame"]) > 0
@@ -242,3 +244,18 @@ def test_the_cost_of_the_cascade_has_its_second_looks(done: tuple[Path, Comparis
     least = facts["consulted"] * min(cost["descriptor"] for cost in costs)
     assert score.microseconds_per_frame >= least
     assert np.isfinite(score.microseconds_per_frame)
+
+
+def test_tests_that_trained_or_stay_in_one_place_and_strange_labels_are_told(
+    runs: Path, done: tuple[Path, Comparison], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    shutil.copytree(runs / "run0", tmp_path / "again")
+    shutil.copytree(runs / "run4", tmp_path / "still")
+    places = tmp_path / "still/localization/places.lst"
+    places.write_text(places.read_text(encoding="utf-8").replace(" kitchen", " halll").replace(" hall\n", " halll\n"))
+    for test in ("again", "still"):
+        compare([runs], [tmp_path / test], tmp_path / "out", methods=["majority"], size=3, cache=done[0] / "cache")
+    told = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
+    assert "again: trained the words and the models, and tells nothing of what is new to them; test on others" in told
+    assert "12 test frames are of 'halll', which the models do not know; the nearest name is 'hall'" in told
+    assert sum("one place throughout" in text for text in told) == 1

@@ -18,7 +18,7 @@ def comparison(*scores: MethodScore) -> Comparison:
 
 
 def score(name: str, accuracy: float, cost: float, consulted: float | None = None) -> MethodScore:
-    return MethodScore(name, accuracy, accuracy - 0.05, accuracy + 0.02, accuracy, None, 0.1, cost, consulted)
+    return MethodScore(name, accuracy, accuracy - 0.05, accuracy + 0.02, accuracy, None, 0.1, cost, 0.3, consulted)
 
 
 @given(st.lists(st.floats(0, 1), max_size=20))

@@ -70,3 +70,21 @@ def test_the_picture_is_drawn_where_it_is_wanted(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     evaluate_files([put(tmp_path / "seq1.tsv", RIGHT)], plot=tmp_path / "out" / "a.png")
     assert (tmp_path / "out" / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_flatters_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    one_place = put(tmp_path / "seq1.tsv", RIGHT)
+    evaluate_files([one_place])
+    assert "every test sequence holds one place throughout" in caplog.text
+    caplog.clear()
+    moving = put(tmp_path / "seq2.tsv", RIGHT + "1\t1\tlap\tw1\t1\thall\t0.9\t0.1\n")
+    evaluate_files([one_place, moving])
+    (record,) = caplog.records
+    assert record.getMessage() == "1 test frames are of 'lap', which the models do not know; the nearest name is 'lab'"
+
+
+def test_frames_that_are_said_to_be_unknown_are_no_strange_label(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    evaluate_files([put(tmp_path / "seq1.tsv", RIGHT + "1\t1\tunknown\tw1\t1\thall\t0.9\t0.1\n")])
+    assert not caplog.records

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.small_world import PLACES, write_world
+from helpers.small_world import PLACES, with_columns, write_world
 
 from placerec.errors import ModelError, OutputError, StreamError
 from placerec.hohmm import format_beliefs, read_beliefs
 from placerec.methods import decode, decode_lines
-from placerec.model import ModelOptions, load_recognizer, train_lm
-from placerec.words import Selection, parse_selection, read_stream
+from placerec.model import Decoding, ModelOptions, load_recognizer, train_lm
+from placerec.words import Selection, parse_selection, read_stream, write_stream
 
 
 @pytest.fixture
@@ -166,3 +166,33 @@ def test_json_files_are_json_lines(world: Path) -> None:
     assert sorted(path.name for path in (world / "beliefs").iterdir()) == ["run1.jsonl", "run2.jsonl", "run3.jsonl"]
     for line in (world / "beliefs/run1.jsonl").read_text().splitlines():
         assert json.loads(line, parse_constant=pytest.fail)["place"] in PLACES
+
+
+def test_sequences_that_trained_are_named_if_they_have_labels(world: Path, caplog: pytest.LogCaptureFixture) -> None:
+    tokens = [world / f"tokens/run{i}.tsv" for i in (1, 2, 3)]
+    decode(tokens, world / "model", out=world / "beliefs")
+    assert [record.getMessage() for record in caplog.records if record.levelname == "WARNING"] == [
+        "run1, run2: trained the models, and tells nothing of what is new to them; test on others"
+    ]
+    caplog.clear()
+    made = {"dictionary": "0" * 64, "trained_on": ["run3"]}
+    (world / "tokens/tokens.json").write_text(json.dumps(made), encoding="utf-8")
+    decode(tokens[2:], world / "model")
+    assert "run3: trained the words" in caplog.text
+    caplog.clear()
+    stream = read_stream(tokens[0])
+    write_stream(with_columns(stream, places=[""] * len(stream)), tokens[0])
+    decode(tokens[:1], world / "model")
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("unknown", [False, True])
+def test_labels_that_the_models_do_not_know_are_told(
+    world: Path, unknown: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    stream = read_stream(world / "tokens/run3.tsv")
+    new = {"kitchen": "kichen", "office": "attic"}
+    write_stream(with_columns(stream, places=[new.get(place, place) for place in stream.places]), world / "run4.tsv")
+    decode([world / "run4.tsv"], world / "model", options=Decoding(unknown=unknown))
+    assert "20 test frames are of 'kichen', which the models do not know; the nearest name is 'kitchen'" in caplog.text
+    assert ("20 test frames are of 'attic'" in caplog.text) == (not unknown)

@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from helpers.point_clouds import clouds
 from placerec.errors import MissingExtraError
 from placerec.hohmm import filter_stream, learned_transition
 from placerec.methods import ullah2008
-from placerec.methods.descriptors import DescriptorTrainingSet
+from placerec.methods.descriptors import DescriptorTrainingSet, through_filter
+from placerec.methods.margins import frame_by_frame, likelihoods
 
 
 def machine_margins(training: DescriptorTrainingSet, points: np.ndarray) -> np.ndarray:
@@ -34,7 +36,7 @@ def test_beliefs_are_the_softmax_of_the_margins(columns: tuple[int, ...]) -> Non
     training, test = (of_places(clouds(seed, sequences=n, apart=1.5), *columns) for seed, n in ((1, 3), (2, 1)))
     training = replace(training, places=training.places[:places], steps=training.steps[:places, :places])
     expected = machine_margins(training, test.points)
-    step = ullah2008.fit(training)()
+    step = frame_by_frame(ullah2008.choose(training)(training))()
     belief = np.array([step(point) for point in test.points])
     np.testing.assert_allclose(belief.sum(axis=1), 1)
     assert (belief.argmax(axis=1) == expected.argmax(axis=1)).all()
@@ -46,7 +48,9 @@ def test_beliefs_are_the_softmax_of_the_margins(columns: tuple[int, ...]) -> Non
 
 def test_the_temperature_is_lower_where_margins_can_be_trusted() -> None:
     pytest.importorskip("sklearn")
-    sure, unsure = (ullah2008.fit(clouds(1, apart=apart))() for apart in (6.0, 0.3))
+    sure, unsure = (
+        frame_by_frame(ullah2008.choose(one)(one))() for one in (clouds(1, apart=6.0), clouds(1, apart=0.3))
+    )
     assert sure(np.array([6.0, 0, 0, 0]))[0] > 0.95
     assert unsure(np.array([0.3, 0, 0, 0])).max() < 0.6
 
@@ -60,7 +64,8 @@ def test_the_filter_gets_beliefs_over_shares() -> None:
     training = replace(
         training, points=training.points[keep], truth=training.truth[keep], sequences=training.sequences[keep]
     )
-    alone, through = ullah2008.fit(training)(), ullah2008.fit_filtered(training)()
+    chosen = ullah2008.choose(training)
+    alone, through = frame_by_frame(chosen(training))(), through_filter(training, partial(likelihoods, chosen))()
     shares = np.bincount(training.truth) / len(training.truth)
     log10_p = np.log10(np.array([alone(point) for point in test.points]) / shares)
     expected = filter_stream(log10_p, learned_transition(training.steps)).belief
@@ -72,11 +77,11 @@ def test_a_place_that_a_fold_lacks_and_a_single_sequence_do_no_harm() -> None:
     training = clouds(1)
     only_there = replace(training, truth=np.where(training.sequences == 2, training.truth, training.truth % 2))
     for training in (only_there, clouds(1, sequences=1)):
-        belief = ullah2008.fit(training)()(training.points[0])
+        belief = frame_by_frame(ullah2008.choose(training)(training))()(training.points[0])
         assert np.isfinite(belief).all()
 
 
 def test_without_scikit_learn_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sklearn", None)
     with pytest.raises(MissingExtraError, match=r"ullah2008 needs .*scikit-learn.*placerec\[systems\]"):
-        ullah2008.fit(clouds())
+        ullah2008.choose(clouds())

@@ -230,6 +230,15 @@ def test_a_place_without_words_is_uniform(tmp_path: Path, name: str, caplog: pyt
     assert (tmp_path / "sentences/attic.txt").read_text() == ""
 
 
+def test_a_model_of_one_place_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    train_model(KITCHEN, ("a", "b", "c", "d"), tmp_path / "one")
+    (record,) = caplog.records
+    assert record.getMessage().startswith("kitchen is the only place, and will be recognised wherever")
+    caplog.clear()
+    train_model({"hall": [["a"]], **KITCHEN}, ("a", "b", "c", "d"), tmp_path / "two")
+    assert not caplog.records
+
+
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("name", SAFE)
 def test_after_every_history_all_words_are_possible_and_sum_to_1(tmp_path: Path, name: str, order: int) -> None:

@@ -3,7 +3,7 @@
 A method is added in COMPARED alone: how it is fitted and run, what it is made of, and what it needs.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
 from itertools import chain
@@ -14,19 +14,35 @@ from typing import Any
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
-from placerec.errors import SourceError
+from placerec.errors import EvaluationError, SourceError, VisionError
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.frames import Sequence as FrameSequence, images_at
 from placerec.frames.sequence import Gray
+from placerec.frames.table import Labels
 from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder
 from placerec.lm.backoff import unite_models
-from placerec.methods import HOHMM, METHODS, knn, make_decoder, pronobis2007, torralba2003, ullah2008
-from placerec.methods.descriptors import DescriptorTrainingSet, MakePointStepper
+from placerec.methods import (
+    HOHMM,
+    METHODS,
+    evidence_weight,
+    knn,
+    logistic,
+    make_decoder,
+    pronobis2007,
+    rbf_svm,
+    torralba2003,
+    ullah2008,
+)
+from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints, MakePointStepper, through_filter
+from placerec.methods.margins import frame_by_frame, likelihoods
 from placerec.methods.tables import PairEmissions
 from placerec.model import Decoding, ModelOptions, PlaceModels, load_model, train_model, transition_of
 from placerec.model.record import record_streams
 from placerec.vision import Descriptors, Dictionary, descriptor
+from placerec.vision.chunks import spooled
+from placerec.vision.options import VIEWS
 from placerec.vision.pca import project
+from placerec.vision.views import place_normalised, place_numbers
 from placerec.words import Selection, WordStream, place_steps, sentences_per_place
 from placerec.words.tokenize import tokens_of
 
@@ -39,6 +55,10 @@ WORDS, TWO_WORDS, DESCRIPTORS = "words", "words, two dictionaries", "descriptors
 # A frame's word (or two, or components) to its belief float64 (C,); and what begins a sequence.
 StepFunction = Callable[[Any], Floats]
 MakeStepper = Callable[[], StepFunction]
+# Chooses the options of a method of descriptors by its training and a seed: what then fits it to a training set.
+ChooseOptions = Callable[..., FitPoints]
+# The views of `vision.views` that such methods are compared on.
+PLAIN, NORMALISED = VIEWS
 
 
 @dataclass(frozen=True)
@@ -53,12 +73,12 @@ class FrontEndCost:
 class EncodedSequences:
     """All sequences through one dictionary, those of the training first.
 
-    `streams`: the words of each sequence; `points` float32 (T, k): the principal components of its T frames.
+    `streams`: the words of each sequence; `points`: by view (VIEWS) the components float32 (T, k) of its T frames.
     """
 
     dictionary: Dictionary
     streams: tuple[WordStream, ...] = field(repr=False)
-    points: tuple[Singles, ...] = field(repr=False)
+    points: Mapping[str, tuple[Singles, ...]] = field(repr=False)
     cost: FrontEndCost
 
     def units(self, sequence: int) -> Ints:
@@ -67,13 +87,24 @@ class EncodedSequences:
         return np.array([number[word] for word in self.streams[sequence].words], np.int64)
 
 
-def encode(job: WordsJob) -> EncodedSequences:
-    """Learn the words of a job, and give all frames of the job theirs. Raises VisionError or SourceError for images."""
-    dictionary = job.dictionary()
+def encode(job: WordsJob, views: Container[str]) -> EncodedSequences:
+    """Learn the words of a job, and give all frames of the job theirs, and their components: PLAIN, and of `views`.
+
+    Raises VisionError or SourceError for images, and EvaluationError for labels that give no place-normalised view.
+    """
+    dictionary, training = job.dictionary(), len(job.train)
     found = [one.load() for one in (*job.train, *job.test)]
     streams = tuple(stream for one in found for stream in tokens_of(one, dictionary))
-    points = tuple(project(one.values, dictionary.pca) for one in found)
-    return EncodedSequences(dictionary, streams, points, _cost(job, found[len(job.train) :], dictionary))
+    points = {PLAIN: tuple(project(one.values, dictionary.pca) for one in found)}
+    if NORMALISED in views:
+        places = Labels.concat([one.table.places for one in found[:training]])
+        try:
+            with spooled(np.concatenate(points[PLAIN][:training])) as codes:
+                pca = place_normalised(dictionary.pca, codes, place_numbers(places, codes.rows))
+        except VisionError as error:
+            raise EvaluationError(f"no view for the methods @{NORMALISED}: {error}; leave them out") from error
+        points[NORMALISED] = tuple(project(one.values, pca) for one in found)
+    return EncodedSequences(dictionary, streams, points, _cost(job, found[training:], dictionary))
 
 
 def _cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dictionary) -> FrontEndCost:
@@ -133,11 +164,31 @@ class Benchmark:
         """The numbers of the test sequences."""
         return range(self.training, len(self.encoded.streams))
 
+    def points(self, view: str) -> DescriptorTrainingSet:
+        """The labelled training frames as points of a view."""
+        streams = self.encoded.streams[: self.training]
+        truth = np.concatenate([stream.table.places.codes(self.places) for stream in streams])
+        sequences = np.repeat(np.arange(len(streams)), [len(stream) for stream in streams])
+        points = np.concatenate(self.encoded.points[view][: self.training]).astype(np.float64)
+        steps = np.sum([place_steps(stream, self.places) for stream in streams], axis=0)
+        known = truth >= 0
+        return DescriptorTrainingSet(points[known], truth[known], sequences[known], self.places, steps)
+
+    def chosen(self, choose: ChooseOptions, view: str) -> FitPoints:
+        """What fits a method with the options that the training asks for, which are chosen once for all its forms."""
+        if (choose, view) not in self._chosen:
+            self._chosen[choose, view] = choose(self.points(view), seed=self.seed)
+        return self._chosen[choose, view]
+
+    @cached_property
+    def _chosen(self) -> dict[tuple[ChooseOptions, str], FitPoints]:
+        return {}
+
     @cached_property
     def key(self) -> str:
         """A digest of all that beliefs depend on, but for the method and the second dictionary."""
         parts: list[object] = [self.training, self.seed, self.encoded.dictionary.fingerprint]
-        for stream, points in zip(self.encoded.streams, self.encoded.points, strict=True):
+        for stream, points in zip(self.encoded.streams, self.encoded.points[PLAIN], strict=True):
             parts += [stream.name, stream.frames, stream.places, stream.words, stream.times, points]
         return key_of(*parts)
 
@@ -157,11 +208,12 @@ class MethodRun:
 
 @dataclass(frozen=True)
 class ComparedMethod:
-    """How a method is fitted and run, what it gets of each frame, and an optional package that it needs."""
+    """How a method is fitted and run, what it gets of each frame, in which view, and a package that it needs."""
 
     run: Callable[[Benchmark], MethodRun]
     kind: str = WORDS
     package: str | None = None
+    view: str = PLAIN
 
 
 def train_models(encoded: EncodedSequences, training: int, cache: Path) -> PlaceModels:
@@ -201,31 +253,22 @@ def _decoded(decoder: SequenceDecoder, benchmark: Benchmark) -> MethodRun:
     return _timed(start, benchmark, [benchmark.encoded.streams[i].words for i in benchmark.tests])
 
 
-def _run_points(fit: Callable[..., MakePointStepper], benchmark: Benchmark) -> MethodRun:
-    """A method of descriptors, which learns from the labelled training frames as points."""
-    places = benchmark.places
-    streams = benchmark.encoded.streams[: benchmark.training]
-    truth = np.concatenate([stream.table.places.codes(places) for stream in streams])
-    sequences = np.repeat(np.arange(len(streams)), [len(stream) for stream in streams])
-    points = np.concatenate(benchmark.encoded.points[: benchmark.training]).astype(np.float64)
-    steps = np.sum([place_steps(stream, places) for stream in streams], axis=0)
-    labelled = truth >= 0
-    training = DescriptorTrainingSet(points[labelled], truth[labelled], sequences[labelled], places, steps)
-    tests = [benchmark.encoded.points[i].astype(np.float64) for i in benchmark.tests]
-    return _timed(fit(training, seed=benchmark.seed), benchmark, tests)
+def _run_points(fit: Callable[[Benchmark], MakePointStepper], view: str, benchmark: Benchmark) -> MethodRun:
+    """A method of descriptors, which learns from the labelled training frames as points of a view."""
+    tests = [benchmark.encoded.points[view][i].astype(np.float64) for i in benchmark.tests]
+    return _timed(fit(benchmark), benchmark, tests)
 
 
 def _run_cascade(benchmark: Benchmark) -> MethodRun:
     """The words of both dictionaries; what a second word costs is added for the frames that ask for it."""
     if benchmark.second is None:
         raise ValueError("the cascade needs a second dictionary")
-    both = (benchmark.encoded, benchmark.second)
-    training = range(benchmark.training)
-    truth = np.concatenate([benchmark.encoded.streams[i].table.places.codes(benchmark.places) for i in training])
-    sequences = np.repeat(training, [len(benchmark.encoded.streams[i]) for i in training])
-    units = [np.concatenate([one.units(i) for i in training])[truth >= 0] for one in both]
+    both, training, known = (benchmark.encoded, benchmark.second), range(benchmark.training), set(benchmark.places)
+    labelled = np.array([place in known for i in training for place in benchmark.encoded.streams[i].places], bool)
+    units = [np.concatenate([one.units(i) for i in training])[labelled] for one in both]
     words = [len(one.dictionary.vocabulary) for one in both]
-    answer = pronobis2007.fit(units, truth[truth >= 0], sequences[truth >= 0], words, len(benchmark.places))
+    points = benchmark.points(PLAIN)
+    answer = pronobis2007.fit(units, points.truth, points.sequences, words, len(benchmark.places))
     asked = 0
 
     def step(pair: tuple[int, int]) -> Floats:
@@ -259,8 +302,37 @@ def _timed(start: MakeStepper, benchmark: Benchmark, inputs: Sequence[Any]) -> M
     return MethodRun(beliefs, 1e6 * fastest / sum(map(len, inputs)))
 
 
-def _points(fit: Callable[..., MakePointStepper], package: str | None = None) -> ComparedMethod:
-    return ComparedMethod(partial(_run_points, fit), DESCRIPTORS, package)
+def _of_descriptors(view: str) -> dict[str, ComparedMethod]:
+    """The methods of descriptors, on the components of a view, which marks all but those of the view `plain`.
+
+    A filter whose evidence has a weight, and that forgets (`evidence_weight`), is marked as tuned.
+    """
+    mark, tuned = ("", "@tuned") if view == PLAIN else (f"@{view}", f"@{view}-tuned")
+
+    def method(fit: Callable[[Benchmark], MakePointStepper], package: str | None = "sklearn") -> ComparedMethod:
+        return ComparedMethod(partial(_run_points, fit, view), DESCRIPTORS, package, view)
+
+    def in_filter(
+        name: str, fit: Callable[[Benchmark], FitPoints], package: str | None = "sklearn"
+    ) -> dict[str, ComparedMethod]:
+        return {
+            f"{name}{mark}": method(lambda one: through_filter(one.points(view), fit(one)), package),
+            f"{name}{tuned}": method(lambda one: evidence_weight.fit(one.points(view), fit(one)), package),
+        }
+
+    def machine(name: str, choose: ChooseOptions) -> dict[str, ComparedMethod]:
+        return {
+            f"{name}{mark}": method(lambda one: frame_by_frame(one.chosen(choose, view)(one.points(view)))),
+            **in_filter(f"{name}-hmm", lambda one: partial(likelihoods, one.chosen(choose, view))),
+        }
+
+    return {
+        **in_filter("torralba2003", lambda one: one.chosen(torralba2003.choose, view), None),
+        **machine("ullah2008", ullah2008.choose),
+        f"knn{mark}": method(lambda one: knn.fit(one.points(view))),
+        **machine("logistic", logistic.choose),
+        **machine("rbf-svm", rbf_svm.choose),
+    }
 
 
 # In the order of the table. The paper's transitions where a method has a filter, unless its source learns them, or it
@@ -271,8 +343,6 @@ COMPARED: dict[str, ComparedMethod] = {
     f"{HOHMM}-order1": ComparedMethod(_run_order1),
     **{name: _words(name, "learned" if name == "mtd" else "fixed") for name in METHODS if name != HOHMM},
     "pronobis2007": ComparedMethod(_run_cascade, TWO_WORDS),
-    "torralba2003": _points(torralba2003.fit),
-    "ullah2008": _points(ullah2008.fit, "sklearn"),
-    "ullah2008-hmm": _points(ullah2008.fit_filtered, "sklearn"),
-    "knn": _points(lambda training, seed: knn.fit(training), "sklearn"),
+    **_of_descriptors(PLAIN),
+    **_of_descriptors(NORMALISED),
 }

@@ -27,7 +27,7 @@ _KINDS = (WORDS, TWO_WORDS, DESCRIPTORS)
 
 @dataclass(frozen=True)
 class MethodScore:
-    """A line of methods.csv; shares from 0 to 1, `consulted` of the frames that asked a second cue."""
+    """A line of methods.csv; shares from 0 to 1, nats; `consulted`: the share of frames that asked a second cue."""
 
     method: str
     accuracy: float
@@ -37,6 +37,7 @@ class MethodScore:
     change_latency_frames: float | None
     ece: float
     microseconds_per_frame: float
+    log_loss: float
     consulted: float | None = None
 
 
@@ -72,6 +73,7 @@ def judge(runs: Mapping[str, MethodRun], cost: FrontEndCost, seed: int) -> Compa
             evaluation.change_latency_frames,
             evaluation.ece,
             runs[name].microseconds,
+            evaluation.log_loss,
             runs[name].consulted,
         )
         for name, evaluation in evaluations.items()
@@ -107,13 +109,15 @@ def format_pairs(pairs: Sequence[Pair]) -> str:
 def format_comparison(found: Comparison) -> str:
     """A table for a terminal, best first, without a line end at its end."""
     lines = [
-        f"{'method':<16}{'accuracy':>9}  {'95 % interval':>15}{'balanced':>10}{'latency':>9}{'ECE':>7}{'us/frame':>10}"
+        f"{'method':<16}{'accuracy':>9}  {'95 % interval':>15}{'balanced':>10}{'latency':>9}{'ECE':>7}"
+        f"{'log loss':>10}{'us/frame':>10}"
     ]
     for s in sorted(found.scores, key=lambda score: -score.accuracy):
         latency = "-" if s.change_latency_frames is None else f"{s.change_latency_frames:g}"
         lines.append(
             f"{s.method:<16}{100 * s.accuracy:>7.1f} %  {100 * s.accuracy_low:>6.1f} - {100 * s.accuracy_high:>4.1f} %"
-            f"{100 * s.balanced_accuracy:>8.1f} %{latency:>9}{s.ece:>7.3f}{s.microseconds_per_frame:>10.1f}"
+            f"{100 * s.balanced_accuracy:>8.1f} %{latency:>9}{s.ece:>7.3f}"
+            f"{s.log_loss:>10.3f}{s.microseconds_per_frame:>10.1f}"
         )
     lines.append(f"{found.frames} frames; always {found.majority_place!r}: {100 * found.majority:.1f} %")
     return "\n".join(lines)

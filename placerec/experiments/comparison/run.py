@@ -15,12 +15,21 @@ from pathlib import Path
 
 from placerec.errors import EvaluationError, SourceError, check_optional
 from placerec.evaluation.bootstrap import LEAST
-from placerec.experiments.comparison.benchmark import COMPARED, TWO_WORDS, Benchmark, MethodRun, encode, train_models
+from placerec.experiments.comparison.benchmark import (
+    COMPARED,
+    TWO_WORDS,
+    Benchmark,
+    EncodedSequences,
+    MethodRun,
+    encode,
+    train_models,
+)
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge, plot_comparison
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
 from placerec.figures.canvas import check_figure
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence, SourceOptions, find_sequences
+from placerec.frames.doubts import warn_of_still_sequences, warn_of_strange_labels, warn_of_training
 from placerec.frames.naming import own_name, unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
 from placerec.jobs import ProgressBar, silent
@@ -61,14 +70,23 @@ def compare(
     out = Path(out)
     check_figure(out / "methods.png")
     training, tests = _split(train, test, source_options)
+    labels = [[frame.place for frame in sequence.frames] for sequence in tests]
+    warn_of_still_sequences(labels)
+    warn_of_strange_labels(labels, sorted({frame.place for one in training for frame in one.frames} - {""}))
     cache = out / "cache" if cache is None else Path(cache)
     with held_output(out, cache):
-        encoded = []
+        encoded: list[EncodedSequences] = []
         for spec in SPECS[: 1 + any(COMPARED[name].kind == TWO_WORDS for name in chosen)]:
             with progress(f"describe ({spec.kind})") as show:
                 described = describe_all([*training, *tests], spec, cache, progress=show)
                 both = tuple(described[: len(training)]), tuple(described[len(training) :])
-                encoded.append(encode(WordsJob(*both, DictionaryOptions(size=size, seed=seed), cache)))
+                if not encoded:
+                    learned = {one.kept for one in both[0]}
+                    warn_of_training(
+                        [one.sequence.name for one in both[1] if one.kept in learned], "words and the models"
+                    )
+                job = WordsJob(*both, DictionaryOptions(size=size, seed=seed), cache)
+                encoded.append(encode(job, () if encoded else {COMPARED[name].view for name in chosen}))
         models = train_models(encoded[0], len(training), cache)
         benchmark = Benchmark(encoded[0], len(training), models, seed, *encoded[1:])
         runs = {}

@@ -1,0 +1,91 @@
+"""The weight of evidence and the filter's memory: what they do to beliefs, and that the training chooses them."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from helpers.point_clouds import clouds, steps_of
+
+from placerec.hohmm import filter_stream
+from placerec.lm.logs import LN10
+from placerec.methods import evidence_weight
+from placerec.methods.descriptors import DescriptorTrainingSet, PointStepFunction, through_filter
+from placerec.methods.evidence_weight import ALPHAS, MEMORIES, best_weights, fading, without
+
+Likelihoods = Callable[[DescriptorTrainingSet], PointStepFunction]
+
+
+def told(sure: float, seen: list[int] | None = None) -> Likelihoods:
+    """Log likelihoods of a nearest centre; `seen` gets how many frames they are learned from."""
+
+    def likelihoods(training: DescriptorTrainingSet) -> PointStepFunction:
+        if seen is not None:
+            seen.append(len(training.truth))
+        centres = np.array([training.points[training.truth == c].mean(axis=0) for c in range(3)])
+        return lambda point: -sure * np.square(centres - point).sum(axis=1)
+
+    return likelihoods
+
+
+def test_beliefs_are_those_of_the_filter_with_weighed_evidence_and_transitions_that_forget() -> None:
+    training, test = clouds(1, apart=1.5), clouds(2, sequences=1, apart=1.5)
+    alpha, memory = best_weights(training, told(3.0))
+    of_point = told(3.0)(training)
+    log10_p = alpha * np.array([of_point(point) for point in test.points]) / LN10
+    expected = filter_stream(log10_p, fading(training, memory)).belief
+    step = evidence_weight.fit(training, told(3.0))()
+    np.testing.assert_allclose(np.array([step(point) for point in test.points]), expected, atol=1e-9)
+
+
+def test_transitions_that_forget_are_learned_ones_and_shares() -> None:
+    training = clouds(1)
+    keep = ~((training.truth == 1) & (np.arange(90) % 2 == 0))
+    fewer = without(training, ~keep)
+    shares = (np.bincount(fewer.truth) + 1 / 3) / (len(fewer.truth) + 1)
+    counts = fewer.steps + 1 / 3
+    learned = counts / counts.sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(fading(fewer, 0.0).matrix, learned)
+    np.testing.assert_allclose(fading(fewer, 0.3).matrix, 0.7 * learned + 0.3 * shares)
+    np.testing.assert_allclose(fading(fewer, 1.0).matrix, np.tile(shares, (3, 1)))
+
+
+def test_evidence_that_is_too_sure_gets_less_weight() -> None:
+    training = clouds(1, sequences=6, apart=1.0)
+    weights = [best_weights(training, told(sure))[0] for sure in (0.5, 5.0, 50.0)]
+    assert weights[0] > weights[1] > weights[2]
+    assert set(weights) <= set(ALPHAS)
+
+
+def test_a_filter_that_is_caught_forgets() -> None:
+    """Places change at every frame, which the steps that were counted do not tell."""
+    training = clouds(1, sequences=6, apart=2.0)
+    rng = np.random.default_rng(0)
+    order = np.concatenate([start + rng.permutation(30) for start in range(0, 180, 30)])
+    jumping = DescriptorTrainingSet(
+        training.points[order], training.truth[order], training.sequences, training.places, training.steps
+    )
+    assert best_weights(jumping, told(0.5))[1] > best_weights(training, told(0.5))[1]
+    assert best_weights(training, told(0.5))[1] < 1
+    assert {best_weights(one, told(0.5))[1] for one in (training, jumping)} <= set(MEMORIES)
+
+
+def test_all_is_learned_without_each_of_five_groups_at_most() -> None:
+    seen: list[int] = []
+    best_weights(clouds(1, sequences=7), told(1.0, seen))
+    assert seen == [150, 150, 180, 180, 180]
+
+
+def test_of_a_single_sequence_nothing_is_chosen() -> None:
+    training = clouds(1, sequences=1)
+    assert best_weights(training, told(50.0)) == (1.0, 0.0)
+    plain, weighed = through_filter(training, told(50.0))(), evidence_weight.fit(training, told(50.0))()
+    for point in training.points:
+        np.testing.assert_allclose(weighed(point), plain(point))
+
+
+def test_steps_are_counted_without_the_sequences_that_are_held_out() -> None:
+    training = clouds(1)
+    rest = without(training, training.sequences == 1)
+    assert sorted(set(rest.sequences.tolist())) == [0, 2]
+    np.testing.assert_array_equal(rest.steps, steps_of(rest.truth, rest.sequences))
+    assert rest.steps.sum() == pytest.approx(58)
