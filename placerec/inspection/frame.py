@@ -124,10 +124,11 @@ def view_frame(image: Path | str, dictionary: Dictionary) -> FrameView:
 def format_frame(view: FrameView) -> str:
     """The word, and a line for each of the nearest units."""
     lines = [f"{view.name}: {view.words[view.unit]}, at a distance of {view.distances[view.unit]:.4g}", ""]
-    lines.append(f"{'nearest':<9}{'distance':>9}{'hits':>7}" + ("  mostly" if view.table is not None else ""))
+    width = max(8, len(view.words[0])) + 1
+    lines.append(f"{'nearest':<{width}}{'distance':>9}{'hits':>7}" + ("  mostly" if view.table is not None else ""))
     for unit in view.nearest:
         note = unit_note(view, unit)
-        text = f"{view.words[unit]:<9}{view.distances[unit]:>9.4f}{view.hits[unit]:>7}"
+        text = f"{view.words[unit]:<{width}}{view.distances[unit]:>9.4f}{view.hits[unit]:>7}"
         lines.append(f"{text}  {note}".rstrip())
     return "\n".join(lines)
 

@@ -75,7 +75,8 @@ def show_words(
         table, sequences = look_up(sources, dictionary, source_options, progress, matrix)
         if picture is not None:
             images = typical_images(table, sequences)
-            draw_word_sheet(table, images, picture, title=f"The words of {Path(words).name}")
+            which = f"{Path(words).name}, dictionary {name}" if name else Path(words).name
+            draw_word_sheet(table, images, picture, title=f"The words of {which}")
     return table
 
 
@@ -190,7 +191,8 @@ def _marks(axes: "Axes", table: WordTable, tiles: _Tiles, colours: Floats) -> No
     for number in range(tiles.size) if written else []:
         middle = (number + 0.5) * tiles.width, (number + 0.5) * tiles.height
         axes.text(middle[0], -0.06, f"+{number}", ha="center", va="bottom", size=7, color="0.4")
-        axes.text(-0.06, middle[1], table.words[number * tiles.size], ha="right", va="center", size=7, color="0.4")
+        word = table.words[number * tiles.size].rpartition(".")[2]
+        axes.text(-0.06, middle[1], word, ha="right", va="center", size=7, color="0.4")
 
 
 def _legend(axes: "Axes", table: WordTable) -> None:

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+from helpers.pictures import drawn_texts
 from helpers.small_world import write_images
 from helpers.typed_commands import fails, placerec
 
@@ -42,6 +43,13 @@ def test_each_of_several_dictionaries_can_be_looked_at(world: Path, several: Pat
     seen = json.loads(placerec("show-frame", image(world), "-w", several, *which).stdout)
     assert seen["word"] == dictionary.word_of(read_gray(image(world)))[0]
     assert seen["word"].startswith(start)
+    header, *rows = placerec("show-frame", image(world), "-w", several, *which[:-2], "-q").stdout.splitlines()[2:]
+    hits = header.index("hits") + len("hits")
+    assert all(row[hits - 1].isdigit() and row[hits : hits + 2].isspace() == (len(row) > hits) for row in rows)
+    pytest.importorskip("matplotlib")
+    placerec("show-words", several, world / "runs", "-o", world / "sheet.svg", *which)
+    title = f"The words of several.npz{f', dictionary {name}' if name else ''}"
+    assert {title, "w0" if size == 3 else "w00"} <= set(drawn_texts(world / "sheet.svg"))
     frames = json.loads(placerec("stability", world / "runs/seq2", "-w", several, *which).stdout)
     dictionary.save(world / "alone.npz")
     assert frames == json.loads(

@@ -130,6 +130,7 @@ def test_long_names_of_many_places_are_shortened_and_nothing_leaves_the_sheet(
     monkeypatch.setattr(Figure, "savefig", look_over)
     places = tuple(f"the_long_corridor_of_the_building_on_floor_{i:02d}" for i in range(30))
     words = table(size, places)
+    words = replace(words, words=tuple(f"placenormalised20.w{unit:03d}" for unit in range(size**2)))
     draw_word_sheet(words, typical(world, words), tmp_path / "a.png", title=f"The words of {'x' * 300}.npz")
     assert sum("…" in text for text in inside) == 31
     assert [text for text, within in inside.items() if not within] == []
