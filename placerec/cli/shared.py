@@ -215,6 +215,30 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
             "[default: NAME.labels beside it]",
         )
         @click.option(
+            "--camera", metavar="NAME", help="The camera to read of a run of several.  [default: colour, or left]"
+        )
+        @click.option(
+            "--from",
+            "begin",
+            metavar="S",
+            type=FiniteRange(min=0),
+            default=0.0,
+            help="Read each sequence from this second on, counted from the first frame.",
+        )
+        @click.option(
+            "--to",
+            "end",
+            metavar="S",
+            type=FiniteRange(min=0, min_open=True),
+            help="Read no frame from this second on.",
+        )
+        @click.option(
+            "--rate",
+            metavar="HZ",
+            type=FiniteRange(min=0, min_open=True),
+            help="Frames a second, where images have no times.",
+        )
+        @click.option(
             "--label-clock",
             type=click.Choice(["auto", "stamps", "start"]),
             default="auto",

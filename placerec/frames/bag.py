@@ -57,11 +57,15 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Bag:
-    """Every `every`-th image of a topic, in order of time. `ranks`: the place in that order of each stored message."""
+    """Every `every`-th image of a topic from number `start` on, in order of time; `listed`: those that are read.
+
+    `ranks`: the place in that order of each stored message.
+    """
 
     path: Path
     topic: str
     every: int
+    start: int = field(repr=False)
     ranks: "array[int]" = field(repr=False, compare=False)
     listed: tuple[Frame, ...] = field(repr=False, compare=False)
     endless: ClassVar[bool] = False
@@ -74,8 +78,8 @@ class Bag:
         number = first
         with _opened(self.path) as reader:
             for rank, (kind, _, data) in zip(self.ranks, _messages(reader, self.path, self.topic), strict=False):
-                index, between = divmod(rank, self.every)
-                if not between and index >= first:
+                index, between = divmod(rank - self.start, self.every)
+                if not between and first <= index < len(self.listed):
                     waiting[index] = kind, data
                 while number in waiting:
                     yield self.listed[number], self._gray(self.listed[number], *waiting.pop(number))

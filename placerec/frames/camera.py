@@ -131,6 +131,8 @@ def find_camera(sources: Iterable[Path | str], options: SourceOptions, endless: 
         raise SourceError(f"{camera}: is no camera; name camera:0, camera:/dev/video0 or camera:rtsp://...{slash}")
     if options.labels or options.topic:
         raise SourceError(f"{camera}: is a camera, which has neither labels nor topics; leave them out")
+    if options.begin or options.end is not None:
+        raise SourceError(f"{camera}: is a camera, whose frames are not known before; leave out --from and --to")
     return Sequence(camera.name, [], camera.path, camera)
 
 

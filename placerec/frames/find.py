@@ -6,36 +6,51 @@ A list on standard input (`-`): the path of an image a line, optionally followed
 import logging
 import math
 import os
+import re
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+
+import numpy as np
 
 from placerec.errors import SourceError, at
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
-from placerec.frames.folder import WANTED, list_folder, natural_key, read_frames
-from placerec.frames.intervals import checked_seconds, find_intervals
+from placerec.frames.folder import WANTED, FileFrames, list_folder, natural_key, read_frames
+from placerec.frames.intervals import Intervals, checked_seconds, find_intervals
 from placerec.frames.layouts import (
+    ABOVE_CAMERAS,
+    BELOW_CAMERA,
     COLD_CAMERA,
     COLD_LIST_FOLDER,
     IDOL_CAMERA,
+    cameras_in_names,
+    choose_camera,
+    find_camera_root,
     find_places_list,
     find_vpc_list,
+    is_camera_folder,
+    is_depth,
     read_labels,
     room_in,
-    seconds_in,
 )
 from placerec.frames.naming import own_name, unique_names
 from placerec.frames.places import check_place, check_twins, checked_place
 from placerec.frames.recordings import WANTED as RECORDED, is_recording, read_recording
 from placerec.frames.sequence import Frame, Sequence, SourceOptions
+from placerec.frames.table import Labels
+from placerec.frames.times import find_times_list, is_stamped, part_of
 
 log = logging.getLogger(__name__)
 
 # COLD needs four (COLD/lab/part/sequence); the limit keeps a mistyped source from walking a whole disk.
 MAX_DEPTH = 6
+# What ImageFolder calls the folders of its folders of places.
+SPLITS = frozenset({"train", "training", "val", "valid", "validation", "test"})
+# Folders that are called so hold runs, whatever is in them, and are no places.
+RUN_NAME = re.compile(r"(?i)(seq|sequence|run|drive|tour|traj|trajectory|session|scan|cam|camera|image)s?[-_ ]?\d*")
 STREAM = Path("-")
 LIST_NAME, STDIN = "stdin", "<stdin>"
 
@@ -44,7 +59,8 @@ LIST_NAME, STDIN = "stdin", "<stdin>"
 class _Found:
     """A sequence that is not read yet: `folder` names it, and `camera` holds its frames.
 
-    `camera` is the folder of its images, or what is recorded in; `place` its label if it is one place.
+    `camera` is the folder of its images, or what is recorded in, of so many `cameras` if it is one of several; `place`
+    its label if it is one place.
     """
 
     folder: Path
@@ -52,6 +68,7 @@ class _Found:
     images: tuple[str, ...] = ()
     places: Path | None = None
     place: str = ""
+    cameras: int = 0
 
 
 def find_sequences(
@@ -69,24 +86,38 @@ def find_sequences(
     if camera := find_camera(sources, options, endless):
         return [camera]
     paths = [Path(source) for source in sources]
-    found = [item for path in paths for item in _in_source(path, options.format)]
+    found = [item for path in paths for item in _in_source(path, options)]
     _check_twice(found)
     _tell_unused(found, options)
+    one_file = options.labels is not None and not options.labels.is_dir()
     own = [LIST_NAME if item.folder == STREAM else own_name(item.folder) for item in found]
     names = unique_names([(name, item.folder) for name, item in zip(own, found, strict=True)], SourceError)
-    alone = sum(_is_recorded(item) for item in found) == 1
-    read = [_read(item, name, options, alone=alone) for name, item in zip(names, found, strict=True)]
+    takers = list(filter(_is_recorded, found)) or list(filter(_is_unlabelled, found))
+    others = replace(options, labels=None) if one_file else options
+    read = [
+        _read(item, name, options if item in takers else others, alone=len(takers) == 1)
+        for name, item in zip(names, found, strict=True)
+    ]
     check_twins(chain.from_iterable(positions for _, positions in read))
-    return [sequence for sequence, _ in read]
+    return _not_empty([sequence for sequence, _ in read], options)
 
 
 def _read(
     item: _Found, name: str, options: SourceOptions, *, alone: bool
 ) -> tuple[Sequence, Iterable[tuple[str, str]]]:
-    """A sequence, and each of its places with the file and line, or the folder, that names it."""
+    """A sequence, and each of its places with the file and line, or the folder, that names it.
+
+    `alone`: nothing else takes a file of labels.
+    """
+    where: Iterable[tuple[str, str]] = ()
     if item.folder == STREAM:
-        frames, where = _read_list()
-        return Sequence(name, frames[:: options.every], item.folder), where
+        listed, where = _read_list()
+        times = np.array([frame.time for frame in listed])
+        if options.rate is not None and np.isnan(times).all():
+            times = np.arange(len(listed)) / options.rate
+            listed = tuple(replace(frame, time=time) for frame, time in zip(listed, times.tolist(), strict=True))
+        part = part_of(times, options.begin, options.end, STDIN)
+        return Sequence(name, listed[part][:: options.every], item.folder), where
     if _is_recorded(item):
         intervals = find_intervals(item.camera, name, options.labels, alone=alone)
         frames, recording = read_recording(item.camera, intervals, options)
@@ -94,25 +125,57 @@ def _read(
     labels = None
     if item.places:
         labels = read_labels(item.places, _absolute(item.folder).name, item.images)
-    files = read_frames(item.camera, item.images, labels=labels, place=item.place)[:: options.every]
+    files = read_frames(item.camera, item.images, labels=labels, place=item.place, rate=options.rate)
     if labels:
-        return Sequence(name, files, item.folder), labels.positions()
-    where = [(item.place, str(item.folder))] if item.place else [(f.place, str(f.path)) for f in files if f.place]
+        where = labels.positions()
+    elif item.place:
+        where = [(item.place, str(item.folder))]
+    elif files.table.labelled.any():
+        where = [(frame.place, str(frame.path)) for frame in files if frame.place]
+    elif intervals := find_intervals(item.folder, name, options.labels, alone=alone, images=True):
+        files, where = _labelled(item, files, intervals, options), intervals.positions()
+    files = files[part_of(files.table.times, options.begin, options.end, str(item.folder))][:: options.every]
     return Sequence(name, files, item.folder), where
+
+
+def _labelled(item: _Found, files: FileFrames, intervals: Intervals, options: SourceOptions) -> FileFrames:
+    if np.isnan(files.table.times).any():
+        log.warning("%s: labels by times, and %s has none; give --rate HZ", intervals.path, item.folder)
+        return files
+    places = intervals.places(files.table.times.tolist(), options.label_clock)
+    return replace(files, table=replace(files.table, places=Labels(places)))
+
+
+def _not_empty(sequences: list[Sequence], options: SourceOptions) -> list[Sequence]:
+    """Those that have a frame in the part that is asked for; SourceError if none has."""
+    some = [sequence for sequence in sequences if len(sequence.frames)]
+    part = f"no frame from second {options.begin:g}" + (f" to {options.end:g}" if options.end is not None else "")
+    for sequence in sequences:
+        if not len(sequence.frames):
+            log.warning("%s: has %s; left out", sequence.source, part)
+    if sequences and not some:
+        raise SourceError(f"{sequences[0].source}: has {part}; choose another part (--from, --to)")
+    return some
 
 
 def _is_recorded(item: _Found) -> bool:
     return not item.images and item.folder != STREAM
 
 
+def _is_unlabelled(item: _Found) -> bool:
+    return bool(item.images) and not item.places and not item.place
+
+
 def _tell_unused(found: list[_Found], options: SourceOptions) -> None:
-    if options.labels and found and not any(map(_is_recorded, found)):
-        log.warning("%s: labels videos and bags, and no source is one; not read", options.labels)
+    if options.labels and found and not any(_is_recorded(item) or _is_unlabelled(item) for item in found):
+        log.warning("%s: every source has labels of its own; not read", options.labels)
     if options.topic and found and not any(is_bag(item.camera) for item in found):
         log.warning("topic %s: no source is a bag", options.topic)
+    if options.camera and found and not any(item.cameras for item in found):
+        log.warning("camera %s: no source is a run of several cameras", options.camera)
 
 
-def _in_source(source: Path, format: str) -> list[_Found]:
+def _in_source(source: Path, options: SourceOptions) -> list[_Found]:
     if source == STREAM:
         return [_Found(source, source)]
     if not source.exists():
@@ -121,24 +184,31 @@ def _in_source(source: Path, format: str) -> list[_Found]:
         return [_Found(source, source)]
     if not source.is_dir():
         raise SourceError(f"{source}: is a file of no kind that is read; name a folder of {WANTED}, or {RECORDED}")
-    if format == "places":
-        return _place_folders(source)
-    found = [_camera(source.parent, source)] if _absolute(source).name == COLD_CAMERA else _below(source)
+    # ImageFolder's splits hold a folder a place.
+    splits = list_folder(source).folders
+    roots = [source / name for name in splits] if splits and SPLITS.issuperset(splits) else [source]
+    if options.format == "places":
+        return [place for root in roots for place in _place_folders(root)]
+    if _absolute(source).name == COLD_CAMERA:
+        found = [_camera(source.parent, source)]
+    else:
+        found = _below(source, options.camera)
     found = _without_aliases(found)
     if not found:
         wanted = f"{COLD_CAMERA}/, {WANTED}, {RECORDED}"
         raise SourceError(f"{source}: no sequence there; looked for {wanted}, {MAX_DEPTH} folders deep")
-    if format == "auto" and _looks_like_places(source, found):
+    if options.format == "auto" and _looks_like_places(roots, found):
+        names = list(dict.fromkeys(item.folder.name for item in found))
         log.warning(
             "%s: read as one folder per place (%s); if they are sequences, say --format sequences",
             source,
-            ", ".join(item.folder.name for item in found[:3]) + (", ..." if len(found) > 3 else ""),
+            ", ".join(names[:3]) + (", ..." if len(names) > 3 else ""),
         )
-        return _place_folders(source)
+        return [place for root in roots for place in _place_folders(root)]
     return found
 
 
-def _below(folder: Path, depth: int = 0, seen: frozenset[str] = frozenset()) -> list[_Found]:
+def _below(folder: Path, camera: str | None, depth: int = 0, seen: frozenset[str] = frozenset()) -> list[_Found]:
     """The sequences at and below a folder. `seen`: the real paths above it, where a loop of links would lead back."""
     real = os.path.realpath(folder)
     if real in seen or depth > MAX_DEPTH:
@@ -148,28 +218,70 @@ def _below(folder: Path, depth: int = 0, seen: frozenset[str] = frozenset()) -> 
         return [_camera(folder, folder / COLD_CAMERA)]
     if is_bag(folder):
         return [_Found(folder, folder)]
+    if run := _run(folder, listing.folders, camera):
+        return [run]
     places = find_places_list(folder) or find_vpc_list(folder)
     if places and not listing.images:
         log.warning("%s: no %s/ and no images beside it; not read", places, COLD_CAMERA)
-    itself = [_Found(_owner(folder, listing.images), folder, listing.images, places)] if listing.images else []
-    if itself and (places or any(seconds_in(name) is not None for name in listing.images)):
+    cameras = cameras_in_names(listing.images)
+    images = cameras[choose_camera(folder, cameras, camera)] if cameras else listing.images
+    itself = [_Found(_owner(folder, images), folder, images, places, cameras=len(cameras))] if images else []
+    if itself and (places or cameras or any(map(is_stamped, images))):
         if listing.recordings:
             log.warning("%s: its images are read, and not %s beside them", folder, ", ".join(listing.recordings))
         return itself
     below = []
     for name in sorted({*listing.folders, *listing.recordings} - {COLD_LIST_FOLDER}, key=natural_key):
         path = folder / name
-        below += [_Found(path, path)] if name in listing.recordings else _below(path, depth + 1, seen | {real})
+        if is_depth(name):
+            log.warning("%s: depth is no picture; not read", path)
+            continue
+        below += [_Found(path, path)] if name in listing.recordings else _below(path, camera, depth + 1, seen | {real})
     if below and itself:
         # Maps and previews lie beside sequences more often than sequences hold folders of images.
         log.warning("%s: holds sequences; %d images beside them not read", folder, len(listing.images))
     return below or itself
 
 
+def _run(folder: Path, folders: Iterable[str], wanted: str | None) -> _Found | None:
+    """The run in `folder` if there are cameras of one: the camera that is `wanted`, or is read by default."""
+    cameras = _cameras(folder, folders)
+    if not cameras:
+        return None
+    others = [name for name in folders if name not in cameras and name not in ABOVE_CAMERAS]
+    if len(cameras) == 1 and not any(map(is_depth, others)):
+        (alone,) = cameras.values()
+        listed = find_times_list(alone.camera) is not None
+        # A folder that is called left or grey may as well be a place among others.
+        if not listed and any(list_folder(folder / name).images for name in others):
+            return None
+    return replace(cameras[choose_camera(folder, cameras, wanted)], cameras=len(cameras))
+
+
+def _cameras(folder: Path, folders: Iterable[str]) -> dict[str, _Found]:
+    """By name, the cameras of a run in `folder` that have images."""
+    found: dict[str, _Found] = {}
+    for name in folders:
+        if name in ABOVE_CAMERAS:
+            found |= _cameras(folder / name, list_folder(folder / name).folders)
+        elif is_camera_folder(name):
+            inside = (folder / name, *(folder / name / part for part in BELOW_CAMERA))
+            if item := next(filter(None, map(_images_of_camera, inside)), None):
+                found[name] = item
+    return found
+
+
+def _images_of_camera(path: Path) -> _Found | None:
+    images = list_folder(path).images if path.is_dir() else ()
+    root = find_camera_root(path)
+    return _Found(root, path, images, find_places_list(root, path)) if images and root else None
+
+
 def _owner(folder: Path, images: tuple[str, ...]) -> Path:
-    """The folder that a sequence with images in `folder` is called after: in KTH-IDOL2 it holds png/."""
-    named = _absolute(folder).name == IDOL_CAMERA and all(map(room_in, images))
-    return _absolute(folder).parent if named else folder
+    """The folder that a sequence with images in `folder` is called after: KTH-IDOL2's holds png/, EuRoC's data/."""
+    here = _absolute(folder)
+    named = here.name == IDOL_CAMERA and all(map(room_in, images))
+    return here.parent if named or (here.name in BELOW_CAMERA and is_camera_folder(here.parent.name)) else folder
 
 
 def _camera(folder: Path, camera: Path) -> _Found:
@@ -190,16 +302,24 @@ def _without_aliases(found: list[_Found]) -> list[_Found]:
     return [item for item in found if id(item) in kept]
 
 
-def _looks_like_places(source: Path, found: list[_Found]) -> bool:
-    # A folder in a folder of the same name is how some archives unpack, and no place.
-    name = _absolute(source).name
-    return find_places_list(source) is None and all(
-        item.folder == item.camera != source == item.camera.parent
-        and item.folder.name != name
-        and item.places is None
-        and item.images
-        and all(seconds_in(name) is None for name in item.images)
-        for item in found
+def _looks_like_places(roots: list[Path], found: list[_Found]) -> bool:
+    # A folder in a folder of the same name is how some archives unpack, and no place; nor is one folder alone.
+    names = {_absolute(root).name for root in roots}
+    return (
+        len({item.folder.name for item in found}) > 1
+        and all(find_places_list(root) is None for root in roots)
+        and all(
+            item.folder == item.camera
+            and item.camera.parent in roots
+            and item.folder.name not in names
+            and not RUN_NAME.fullmatch(item.folder.name)
+            and item.places is None
+            and not item.cameras
+            and item.images
+            and not any(map(is_stamped, item.images))
+            and find_times_list(item.camera) is None
+            for item in found
+        )
     )
 
 

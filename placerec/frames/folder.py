@@ -18,11 +18,14 @@ from placerec.frames.layouts import room_in, seconds_in
 from placerec.frames.places import PlaceList
 from placerec.frames.sequence import Frame
 from placerec.frames.table import FrameTable
+from placerec.frames.times import find_times_list, read_times, stamp_in, times_at_rate
 
 log = logging.getLogger(__name__)
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff", ".pgm", ".ppm")
 RECORDINGS = (*video.SUFFIXES, *bag.SUFFIXES)
+# What devices, archivers and systems leave behind.
+_NOT_OURS = frozenset({"@eaDir", "#recycle", "$RECYCLE.BIN", "__MACOSX", "lost+found", "System Volume Information"})
 WANTED = "images (" + " ".join(f"*{suffix}" for suffix in SUFFIXES) + ")"
 
 
@@ -89,7 +92,7 @@ def list_folder(folder: Path) -> Listing:
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
-                if entry.name.startswith("."):
+                if entry.name.startswith(".") or entry.name in _NOT_OURS:
                     continue
                 if _is_folder(entry):
                     folders.append(entry.name)
@@ -110,17 +113,26 @@ def _is_folder(entry: "os.DirEntry[str]") -> bool:
         return False
 
 
-def read_frames(folder: Path, images: Iterable[str], *, labels: PlaceList | None = None, place: str = "") -> FileFrames:
+def read_frames(
+    folder: Path,
+    images: Iterable[str],
+    *,
+    labels: PlaceList | None = None,
+    place: str = "",
+    rate: float | None = None,
+) -> FileFrames:
     """The frames of `images` (file names in `folder`), in the order of their time stamps, else in natural order.
 
-    Labels come from `labels`; without it from the names (KTH-IDOL2), else all are `place`. Raises SourceError where
-    some names carry a time stamp and others do not.
+    Times are those in names as in COLD, of a list beside the images, in names that are numbers, or such that there are
+    `rate` a second. Labels come from `labels`; without it from the names (KTH-IDOL2), else all are `place`. Raises
+    SourceError where some names carry a time stamp as in COLD and others do not, and for a list that cannot be used.
     """
     names = sorted(images)
     times = _times(folder, names)
     if np.isnan(times).any():
         names.sort(key=natural_key)
-    else:
+        times = _other_times(folder, names, rate)
+    if not np.isnan(times).any():
         by_time = np.argsort(times, kind="stable")
         names, times = [names[row] for row in by_time], times[by_time]
     if labels:
@@ -128,8 +140,6 @@ def read_frames(folder: Path, images: Iterable[str], *, labels: PlaceList | None
         places = [labels.places.get(name, "") for name in names]
     else:
         places = [room_in(name) or place for name in names]
-        if not any(places):
-            log.info("%s: no places.lst; its frames have no label", folder)
     # What the sequence will be called is not known yet.
     return FileFrames(folder, FrameTable.of("", names, times, places))
 
@@ -144,6 +154,15 @@ def _times(folder: Path, images: Sequence[str]) -> Floats:
         stamped = len(images) - int(timeless.sum())
         raise SourceError(f"{first}: no time stamp in its name, and {stamped} images there have one; remove it")
     return times
+
+
+def _other_times(folder: Path, names: Sequence[str], rate: float | None) -> Floats:
+    if path := find_times_list(folder):
+        return read_times(path, names)
+    stamps = [stamp_in(name) for name in names]
+    if None not in stamps:
+        return np.array(stamps, np.float64)
+    return np.full(len(names), np.nan) if rate is None else times_at_rate(names, rate)
 
 
 def _report(labels: PlaceList, images: Sequence[str]) -> None:

@@ -103,7 +103,7 @@ def content_key(sequence: Sequence, batch: Batch) -> str:
     """A digest of what the batch's images are read from: names, sizes and times of change of the files."""
     recording = sequence.recording
     files = [frame.path for frame in batch.frames] if recording is None else recording.files()
-    whole = None if recording is None else [repr(recording), batch.first, len(batch.frames)]
+    whole = None if recording is None else [repr(recording), batch.frames[0].name, len(batch.frames)]
     return content_digest(whole, [(str(path), _state(path)) for path in files])
 
 

@@ -96,22 +96,25 @@ def read_intervals(path: Path) -> Intervals:
     return Intervals(path, tuple(found))
 
 
-def find_intervals(recording: Path, name: str, labels: Path | None, *, alone: bool) -> Intervals | None:
-    """The labels of the recording that is called `name`; None where there are none.
+def find_intervals(
+    source: Path, name: str, labels: Path | None, *, alone: bool, images: bool = False
+) -> Intervals | None:
+    """The labels of the recording, or the folder of `images`, that is called `name`; None where there are none.
 
     `labels`: the file of the only recording, or a folder that holds NAME.labels for each; None: STEM.labels beside the
-    recording. Raises SourceError for one file and several recordings, and for what cannot be read.
+    source. Raises SourceError for one file and several recordings, and for what cannot be read.
     """
     if labels is not None and not labels.is_dir():
         if not alone:
             raise SourceError(f"{labels}: is one file for several recordings; name a folder that holds {name}{SUFFIX}")
         return read_intervals(labels)
-    here = recording if recording.name not in ("", "..") else Path(os.path.abspath(recording))
+    here = source if source.name not in ("", "..") else Path(os.path.abspath(source))
     own = here.name if here.is_dir() else here.stem
     path = here.parent / f"{own}{SUFFIX}" if labels is None else labels / f"{name}{SUFFIX}"
     if path.exists():
         return read_intervals(path)
-    log.log(logging.INFO if labels is None else logging.WARNING, "%s: no %s; its frames have no label", recording, path)
+    missing = "places.lst" if labels is None and images else path
+    log.log(logging.INFO if labels is None else logging.WARNING, "%s: no %s; its frames have no label", source, missing)
     return None
 
 

@@ -5,12 +5,15 @@ KTH-IDOL2 (readings 4.3): SEQUENCE/png/ holds the images, whose names say when a
 VPC (readings 4.4): HOME/label.txt labels ranges of numbers of the images HOME/FLOOR/%08d.jpg. Grammar of label.txt,
 line by line: `FLOOR/` begins a floor; a number alone is how many images it has; `first last category` labels a range,
 both ends included; `-1 -1 end` ends the floor, and a second one the labels: notes follow.
+Runs of several cameras, a folder each: rgb/ and depth/ (TUM RGB-D), image_0/ to image_3/ (KITTI), mav0/cam0/data/
+(EuRoC), lb3/Cam0/ (NCLT), mono_left/ and stereo/left/ (RobotCar); or a suffix each: *.color.png and *.depth.png
+(7-Scenes). One is read, the colour or the left one unless another is asked for, and depth never.
 """
 
 import logging
 import os
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
 from placerec.errors import SourceError, at
@@ -35,6 +38,18 @@ _NUMBERED = re.compile(r"(\d+)\.[^.]+")
 log = logging.getLogger(__name__)
 
 
+# A camera's folder, and folders between it and the run, and between it and its images.
+_CAMERA = re.compile(
+    r"(?i)rgb|colou?r|gr[ae]y|ir|infra[12]?|image_?(\d+|left|right)|cam_?\d+|camera_?\d+|left|right|cent(re|er)"
+    r"|mono_(left|right|rear)"
+)
+ABOVE_CAMERAS, BELOW_CAMERA = ("mav0", "lb3", "stereo"), ("data", "images")
+_DEPTH = re.compile(r"(?i)(.*_)?depth(_?(raw|registered|aligned|images?|\d+))?")
+# The cameras that are read by default: colour, left of colour (KITTI), left, middle, to the front (NCLT), the first.
+_PREFERRED = [re.compile(text) for text in (r"(?i)rgb|colou?r", "image_0?2", "(?i).*left", "(?i)cent.*", "Cam5", ".*")]
+_WITH_CAMERA = re.compile(r"(?i).*[._-](rgb|colou?r|gr[ae]y|ir|left|right|depth)\.[^.]+")
+
+
 def seconds_in(name: str) -> float | None:
     """The seconds in an image's name, if it is one of COLD (`t%.6f_x%f_y%f_a%f.jpeg`, `t%.6f.jpeg`) or KTH-IDOL2."""
     match = _COLD.fullmatch(name) or _COLD_POSELESS.fullmatch(name) or _IDOL.fullmatch(name)
@@ -45,6 +60,51 @@ def room_in(name: str) -> str | None:
     """The room's code (BO, CR, EO, KT, PA) in an image's name of KTH-IDOL2 (`t%.6f_rBO_x%g_y%g_a%g.png`)."""
     match = _IDOL.fullmatch(name)
     return match[2] if match else None
+
+
+def find_camera_root(folder: Path) -> Path | None:
+    """The folder of the run that a folder of images is a camera of; None if it is not called so."""
+    camera = folder.parent if folder.name in BELOW_CAMERA else folder
+    if not _CAMERA.fullmatch(camera.name):
+        return None
+    return camera.parent.parent if camera.parent.name in ABOVE_CAMERAS else camera.parent
+
+
+def is_depth(name: str) -> bool:
+    """Whether a folder is called as those of depth images are."""
+    return _DEPTH.fullmatch(name) is not None
+
+
+def is_camera_folder(name: str) -> bool:
+    """Whether a folder is called as that of one of several cameras is."""
+    return _CAMERA.fullmatch(name) is not None
+
+
+def cameras_in_names(images: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """The images of each camera, depth left out, where all names end in one of several: `*.color.png`; else none."""
+    found: dict[str, list[str]] = {}
+    for name in images:
+        match = _WITH_CAMERA.fullmatch(name)
+        if not match:
+            return {}
+        found.setdefault(match[1], []).append(name)
+    pictures = {camera: tuple(names) for camera, names in found.items() if camera.lower() != "depth"}
+    return pictures if len(found) > 1 else {}
+
+
+def choose_camera(folder: Path, cameras: Collection[str], wanted: str | None) -> str:
+    """The camera that is asked for, or the one that is read by default, which is told of.
+
+    Raises SourceError if none is called so.
+    """
+    if wanted is not None:
+        if wanted not in cameras:
+            raise SourceError(f"{folder}: has no camera {wanted}; its cameras are: {', '.join(sorted(cameras))}")
+        return wanted
+    camera = next(name for kind in _PREFERRED for name in sorted(cameras) if kind.fullmatch(name))
+    if len(cameras) > 1:
+        log.info("%s: of its cameras %s, %s is read; for another say --camera", folder, ", ".join(cameras), camera)
+    return camera
 
 
 def find_places_list(*folders: Path) -> Path | None:

@@ -3,9 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from placerec.frames import bag, video
 from placerec.frames.intervals import Intervals
 from placerec.frames.sequence import Frame, Recording, SourceOptions
+from placerec.frames.times import part_of
 
 WANTED = "videos (" + " ".join(f"*{suffix}" for suffix in video.SUFFIXES) + ") and bags (*.bag *.mcap *.db3)"
 
@@ -22,18 +25,20 @@ def read_recording(path: Path, labels: Intervals | None, options: SourceOptions)
     """
     if bag.is_bag(path):
         topic, ranks, stamps = bag.list_bag(path, options.topic)
-        frames = _frames(path, stamps, labels, options)
-        return frames, bag.Bag(path, topic, options.every, ranks, frames)
+        frames, first = _frames(path, stamps, labels, options)
+        return frames, bag.Bag(path, topic, options.every, first, ranks, frames)
     times = video.list_times(path)
-    frames = _frames(path, times, labels, options)
-    return frames, video.Video(path, options.every, times, frames)
+    frames, first = _frames(path, times, labels, options)
+    return frames, video.Video(path, options.every, first, times, frames)
 
 
-def _frames(path: Path, times: Sequence[float], labels: Intervals | None, options: SourceOptions) -> tuple[Frame, ...]:
-    chosen = [(number, times[number]) for number in range(0, len(times), options.every)]
-    seconds = [time for _, time in chosen]
-    places = labels.places(seconds, options.label_clock) if labels else [""] * len(chosen)
+def _frames(
+    path: Path, times: Sequence[float], labels: Intervals | None, options: SourceOptions
+) -> tuple[tuple[Frame, ...], int]:
+    """The frames that are read, and the number of the first of them; `times`: of all."""
+    part = part_of(np.array(times), options.begin, options.end, str(path))
+    numbers = range(len(times))[part][:: options.every]
+    places = labels.places(times, options.label_clock) if labels else [""] * len(times)
     # Six digits: as many frames as ten hours have, so that names sort as frames do.
-    return tuple(
-        Frame(f"{number:06d}", time, place, path) for (number, time), place in zip(chosen, places, strict=True)
-    )
+    frames = tuple(Frame(f"{number:06d}", times[number], places[number], path) for number in numbers)
+    return frames, numbers.start

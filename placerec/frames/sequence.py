@@ -3,6 +3,7 @@
 import collections.abc
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Protocol
 
@@ -70,10 +71,12 @@ class SourceOptions:
     `format`: what a folder of folders of images is: "sequences"; "places" (one folder per place: SOURCE/PLACE/ holds
     images); or "auto", which takes a folder of unlabelled, unstamped image folders for the latter and says so.
     `every`: of so many frames the first is read. `topic`: the topic of a bag, None for its only one of images.
-    `labels`: the labels file of a video or a bag, or a folder of NAME.labels; None for NAME.labels beside it.
-    `label_clock`: what the seconds in it are: "stamps", those of the frames' times; "start", counted from the first
-    frame; or "auto", which takes them for the latter if all end before the first frame. Raises SourceError for a value
-    that does not exist.
+    `labels`: the file of intervals that labels a video, a bag or timed images, or a folder of NAME.labels; None for
+    NAME.labels beside it. `label_clock`: what the seconds in it are: "stamps", those of the frames' times; "start",
+    counted from the first frame; or "auto", which takes them for the latter if all end before the first frame.
+    `camera`: of several in a run, None for colour or the left one. `begin`, `end`: the part of each sequence that is
+    read, in seconds from the first frame, without its end. `rate`: frames a second where images have no times. Raises
+    SourceError for a value that does not exist.
     """
 
     format: str = "auto"
@@ -81,12 +84,20 @@ class SourceOptions:
     topic: str | None = None
     labels: Path | None = None
     label_clock: str = "auto"
+    camera: str | None = None
+    begin: float = 0.0
+    end: float | None = None
+    rate: float | None = None
 
     def __post_init__(self) -> None:
         if self.format not in FORMATS:
             raise SourceError(f"format {self.format!r} is not known; choose one of {', '.join(FORMATS)}")
         if self.label_clock not in CLOCKS:
             raise SourceError(f"label clock {self.label_clock!r} is not known; choose one of {', '.join(CLOCKS)}")
+        if not (0 <= self.begin < (inf if self.end is None else self.end)):
+            raise SourceError(f"from {self.begin:g} to {self.end} seconds is no part of a run; give 0 <= from < to")
+        if self.rate is not None and not 0 < self.rate < inf:
+            raise SourceError(f"a rate of {self.rate:g} frames a second is not possible; give one above 0")
         if self.every < 1:
             raise SourceError(f"every {self.every} frames is not possible; say 1 at least")
         if self.labels is not None and not self.labels.exists():

@@ -29,10 +29,14 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Video:
-    """Every `every`-th frame of a video file. `times`: of all its frames; `listed`: those that are read."""
+    """Every `every`-th frame of a video file from number `start` on; `listed`: those that are read.
+
+    `times`: of all frames of the file.
+    """
 
     path: Path
     every: int
+    start: int = field(repr=False)
     times: "array[float]" = field(repr=False, compare=False)
     listed: tuple[Frame, ...] = field(repr=False, compare=False)
     endless: ClassVar[bool] = False
@@ -45,7 +49,7 @@ class Video:
             return
         with _opened(self.path) as capture:
             for position, decoded in _decoded(capture, self.times, late=self.path.suffix.lower() == ".avi"):
-                index, between = divmod(position, self.every)
+                index, between = divmod(position - self.start, self.every)
                 if between or index < first:
                     continue
                 name = f"{self.path}: frame {self.listed[index].name}"

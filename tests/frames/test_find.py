@@ -222,8 +222,9 @@ def test_the_current_folder_has_a_name(tmp_path: Path, monkeypatch: pytest.Monke
     (sequence,) = find_sequences(["."])
     assert (sequence.name, len(sequence.frames), sequence.frames[0].place) == ("run", 2, "")
     monkeypatch.chdir(tmp_path)
-    (place,) = find_sequences(["."])
-    assert (place.name, place.frames[0].place) == ("run", "run")
+    # One folder alone is no set of places.
+    (sequence,) = find_sequences(["."])
+    assert (sequence.name, sequence.frames[0].place) == ("run", "")
 
 
 def test_sources_that_are_none(tmp_path: Path) -> None:

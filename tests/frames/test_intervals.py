@@ -152,7 +152,10 @@ def test_labels_and_topics_that_are_for_no_source_are_told_of(tmp_path: Path, ca
     labels = tmp_path / "x.labels"
     labels.touch()
     find_sequences([tmp_path / "run"], options=SourceOptions(labels=labels, topic="/c"))
-    assert f"{labels}: labels videos and bags, and no source is one; not read" in caplog.messages
+    assert f"{labels}: labels by times, and {tmp_path / 'run'} has none; give --rate HZ" in caplog.messages
+    (tmp_path / "run/places.lst").write_text("a.png hall\n")
+    find_sequences([tmp_path / "run"], options=SourceOptions(labels=labels))
+    assert f"{labels}: every source has labels of its own; not read" in caplog.messages
     assert "topic /c: no source is a bag" in caplog.messages
 
 
