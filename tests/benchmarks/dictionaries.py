@@ -1,27 +1,38 @@
-"""What the words of four dictionaries cost beside GIST: the default's two views of two sizes.
+"""What words and beliefs of four dictionaries cost beside GIST: the default's two views of two sizes, eight places.
 
     OPENBLAS_NUM_THREADS=1 python tests/benchmarks/dictionaries.py [TURNS]
 
-`live`: frame by frame, each described and looked up in turn, as `decode --live` does. `batch`: 64 frames at a time, as
-`tokenize` does. Microseconds a frame, medians over all turns of one process, of CPU time. The frames are synthetic
-(blurred noise): the time does not depend on what they show.
+`one by one`: each frame is described, looked up and answered in turn, as `decode --live` does. `together`: 64 frames
+are looked up at a time, as `tokenize` does, and a sequence of 1000 is decoded as a whole. Microseconds a frame, medians
+over all turns of one process, of CPU time. The frames are synthetic (blurred noise): the time does not depend on what
+they show.
 """
 
+import logging
 import statistics
 import sys
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeVar, cast
 
 import cv2
 import numpy as np
 
+from placerec.arrays import Singles
 from placerec.frames.sequence import Gray
-from placerec.vision import DescriptorSpec, DictionarySet, DictionarySetOptions
+from placerec.frames.table import FrameTable
+from placerec.hohmm import Recognizer
+from placerec.model import load_recognizer, train_lm
+from placerec.vision import Descriptors, DescriptorSpec, DictionarySet, DictionarySetOptions
 from placerec.vision.gist import gist
+from placerec.words import WordStream
+from placerec.words.folder import write_tokens
+from placerec.words.tokenize import tokens_of
 
 T = TypeVar("T")
-FRAMES, TOGETHER = 24, 64
+FRAMES, TOGETHER, PLACES, LENGTH = 24, 64, 8, 1000
 
 
 def make_pictures() -> list[Gray]:
@@ -31,14 +42,25 @@ def make_pictures() -> list[Gray]:
     return [cast(Gray, cv2.GaussianBlur(one, (0, 0), 2)) for one in noise]
 
 
-def make_dictionaries() -> DictionarySet:
-    """Dictionaries of descriptors that lie about as those of images do."""
-    rng = np.random.default_rng(1)
-    centres = rng.random((1600, 384)) * 0.2
-    near = rng.integers(len(centres), size=8000)
-    rows = (centres[near] + 0.02 * rng.random((8000, 384))).astype(np.float32)
-    places = [f"place {number % 8}" for number in near.tolist()]
-    return DictionarySet.fit(rows, spec=DescriptorSpec(), places=places, options=DictionarySetOptions(epochs=4))
+def make_run(name: str, seed: int) -> Descriptors:
+    """Descriptors that lie about as those of images do, of a run through the places."""
+    centres = np.random.default_rng(1).random((PLACES, 200, 384)) * 0.2
+    rng = np.random.default_rng([2, seed])
+    place = np.arange(LENGTH) * 2 * PLACES // LENGTH % PLACES
+    rows = centres[place, rng.integers(200, size=LENGTH)] + 0.02 * rng.random((LENGTH, 384))
+    table = FrameTable.of(name, [f"{number}.png" for number in range(LENGTH)], places=[f"place{one}" for one in place])
+    return Descriptors(DescriptorSpec(), rows.astype(np.float32), table)
+
+
+def make_recognizer(folder: Path) -> tuple[DictionarySet, Recognizer, WordStream]:
+    """What eight runs have trained, and the words of a ninth."""
+    runs = [make_run(f"run{number}", number) for number in range(8)]
+    frames = Descriptors.concat(runs)
+    options = DictionarySetOptions(epochs=4)
+    dictionaries = DictionarySet.fit(frames.values, spec=frames.spec, places=frames.table.places, options=options)
+    write_tokens(tokens_of(frames, dictionaries), dictionaries, folder / "tokens")
+    train_lm([folder / "tokens"], folder / "model")
+    return dictionaries, load_recognizer(folder / "model"), tokens_of(make_run("test", 9), dictionaries)[0]
 
 
 def seconds(function: Callable[[T], object], given: T) -> float:
@@ -48,23 +70,40 @@ def seconds(function: Callable[[T], object], given: T) -> float:
     return time.thread_time() - start
 
 
-def main() -> None:
-    """Print a line for each way of looking words up."""
-    turns = int(sys.argv[1]) if len(sys.argv) > 1 else 40
-    pictures, dictionaries = make_pictures(), make_dictionaries()
+def measured(
+    pictures: list[Gray], dictionaries: DictionarySet, recognizer: Recognizer, test: WordStream, turns: int
+) -> dict[str, list[float]]:
+    """The seconds that each stage took for a frame, turn by turn."""
     rows = np.array([gist(picture) for picture in pictures])
-    batch = np.resize(rows, (TOGETHER, rows.shape[1]))
-    described, live, together = [], [], []
+    batch: Singles = np.resize(rows, (TOGETHER, rows.shape[1]))
+    found: dict[str, list[float]] = {name: [] for name in STAGES}
+    vocabularies = [one.vocabulary for one in dictionaries.dictionaries]
     for _ in range(turns):
         for picture, row in zip(pictures, rows, strict=True):
-            described.append(seconds(gist, picture))
-            live.append(seconds(dictionaries.words, row[None]))
-        together.append(seconds(dictionaries.words, batch) / TOGETHER)
-    whole = statistics.median(described)
-    print(f"{'':8}{'us':>8}{'/ GIST':>10}")
-    for name, found in (("GIST", described), ("live", live), ("batch", together)):
-        print(f"{name:8}{1e6 * statistics.median(found):8.1f}{statistics.median(found) / whole:10.4f}")
+            found["GIST"].append(seconds(gist, picture))
+            found["one by one: words"].append(seconds(dictionaries.words, row[None]))
+            answer = dictionaries.words(row[None])
+            words = [names[units[0]] for names, (units, _) in zip(vocabularies, answer, strict=True)]
+            found["one by one: belief"].append(seconds(recognizer.answer, words))
+        found["together: words"].append(seconds(dictionaries.words, batch) / TOGETHER)
+        found["together: belief"].append(seconds(recognizer.decode, test) / LENGTH)
+    return found
+
+
+STAGES = ("GIST", "one by one: words", "one by one: belief", "together: words", "together: belief")
+
+
+def main(turns: int) -> None:
+    """Print a line for each stage."""
+    logging.disable()
+    with tempfile.TemporaryDirectory() as folder:
+        found = measured(make_pictures(), *make_recognizer(Path(folder)), turns)
+    medians = {name: statistics.median(times) for name, times in found.items()}
+    print(f"{'':20}{'us':>8}{'/ GIST':>10}")
+    for name, median in medians.items():
+        print(f"{name:20}{1e6 * median:8.1f}{median / medians['GIST']:10.4f}")
 
 
 if __name__ == "__main__":
-    main()
+    cv2.setNumThreads(1)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 40)
