@@ -37,6 +37,7 @@ _ROOMS = {
         "read_beliefs",
         "read_transitions",
     ),
+    "placerec.learning": ("learn",),
     "placerec.model": ("Decoding", "ModelOptions", "calibrate", "load_recognizer", "train_lm", "update"),
     "placerec.methods": ("decode", "follow_live", "load_decoder"),
     "placerec.evaluation.metrics": ("evaluate",),
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from placerec.inspection.word_sheet import show_words
     from placerec.inspection.word_stability import stability
     from placerec.lab.layout import render_lab
+    from placerec.learning import learn
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
     from placerec.lm.check import check_model
     from placerec.lm.inspect import inspect_model

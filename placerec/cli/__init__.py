@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from placerec.cli import experiments, images, models
+from placerec.cli import experiments, images, learning, models
 from placerec.cli.srilm import SRILM_COMMANDS
 from placerec.errors import PlacerecError
 from placerec.version import __version__
@@ -63,9 +63,12 @@ def commands() -> None:
     """Which place is the camera in? Images become words, places become language models."""
 
 
-for command in (*vars(images).values(), *vars(models).values(), *vars(experiments).values(), *SRILM_COMMANDS):
-    if isinstance(command, click.Command):
-        commands.add_command(command)
+for module in (learning, images, models, experiments):
+    for command in vars(module).values():
+        if isinstance(command, click.Command):
+            commands.add_command(command)
+for command in SRILM_COMMANDS:
+    commands.add_command(command)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

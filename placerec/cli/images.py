@@ -1,11 +1,15 @@
 """Images and words: `placerec describe`, `train-words`, `tokenize`, `show-words`, `show-frame` and `stability`."""
 
+import functools
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from placerec.cli import shared
+
+if TYPE_CHECKING:
+    from placerec.vision import DictionarySetOptions
 
 
 @click.command(epilog="Example: placerec describe COLD/seq1_cloudy1 -o descriptors.npz")
@@ -27,55 +31,73 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
         describe_sources(sources, out, progress=progress, **how)
 
 
+def dictionary_options(function: shared.Command) -> shared.Command:
+    """--views, --size and what else dictionaries are learned with. The command gets `words`, the options."""
+
+    @click.option(
+        "--views",
+        metavar="VIEW,...",
+        callback=shared.listed(click.Choice(["plain", "pn"])),
+        default="plain,pn",
+        help="What maps see: principal components (plain), or these by how little the frames of one place differ (pn).",
+    )
+    @click.option(
+        "--size",
+        "--sizes",
+        "sizes",
+        metavar="N,...",
+        callback=shared.listed(click.IntRange(2, 200)),
+        default="10,20",
+        help="Sides of the maps: a dictionary of size x size words for each, in every view.",
+    )
+    @click.option("--components", type=click.IntRange(min=1), default=80, help="Principal components that a map sees.")
+    @shared.seed_option("Another seed, another map.")
+    @click.option(
+        "--fraction",
+        type=shared.FiniteRange(0, 1, min_open=True),
+        default=1.0,
+        help="Share of the frames to train on, drawn by the seed.",
+    )
+    @click.option(
+        "--epochs",
+        type=click.IntRange(min=1),
+        help="Passes over the frames.  [default: 50, or fewer if the words settle]",
+    )
+    @click.option(
+        "--units",
+        type=click.Choice(["live", "all"]),
+        default="live",
+        help="Whether units that no training frame hit can be words.",
+    )
+    @click.option(
+        "--rule",
+        type=click.Choice(["batch", "online"]),
+        default="batch",
+        help="All frames at once, or Kohonen's one after the other (slow, for comparison).",
+    )
+    @click.option(
+        "--width",
+        type=shared.FiniteRange(min=0, min_open=True),
+        default=0.5,
+        help="Final width of the neighbourhood, in units; it starts at size/2.",
+    )
+    @functools.wraps(function)
+    def learning(*args: Any, **options: Any) -> Any:
+        from dataclasses import fields
+
+        from placerec.vision import DictionarySetOptions
+
+        words = DictionarySetOptions(**{field.name: options.pop(field.name) for field in fields(DictionarySetOptions)})
+        return function(*args, words=words, **options)
+
+    return learning
+
+
 @click.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
 @shared.source_arguments
-@click.option(
-    "--views",
-    metavar="VIEW,...",
-    callback=shared.listed(click.Choice(["plain", "pn"])),
-    default="plain,pn",
-    help="What maps see: principal components (plain), or these by how little the frames of one place differ (pn).",
-)
-@click.option(
-    "--size",
-    "--sizes",
-    "sizes",
-    metavar="N,...",
-    callback=shared.listed(click.IntRange(2, 200)),
-    default="10,20",
-    help="Sides of the maps: a dictionary of size x size words for each, in every view.",
-)
+@dictionary_options
 @shared.as_in_paper(
     "The paper's words: --views plain --size 10; options given beside it win.", views="plain", sizes="10"
-)
-@click.option("--components", type=click.IntRange(min=1), default=80, help="Principal components that a map sees.")
-@shared.seed_option("Another seed, another map.")
-@click.option(
-    "--fraction",
-    type=shared.FiniteRange(0, 1, min_open=True),
-    default=1.0,
-    help="Share of the frames to train on, drawn by the seed.",
-)
-@click.option(
-    "--epochs", type=click.IntRange(min=1), help="Passes over the frames.  [default: 50, or fewer if the words settle]"
-)
-@click.option(
-    "--units",
-    type=click.Choice(["live", "all"]),
-    default="live",
-    help="Whether units that no training frame hit can be words.",
-)
-@click.option(
-    "--rule",
-    type=click.Choice(["batch", "online"]),
-    default="batch",
-    help="All frames at once, or Kohonen's one after the other (slow, for comparison).",
-)
-@click.option(
-    "--width",
-    type=shared.FiniteRange(min=0, min_open=True),
-    default=0.5,
-    help="Final width of the neighbourhood, in units; it starts at size/2.",
 )
 @click.option(
     "--held-out",
@@ -88,20 +110,17 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
 @shared.output_option("words.npz", "The dictionary to write.")
 @shared.work_options
 @shared.talk_options
-def train_words(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
+def train_words(sources: tuple[Path, ...], out: Path, words: "DictionarySetOptions", **how: Any) -> None:
     """Learn visual words: PCA and maps of descriptors.
 
     SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
     folder of images (any, or laid out as in COLD, KTH-IDOL2 or VPC), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
     folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
     """
-    from dataclasses import fields
+    from placerec.vision import train_dictionary
 
-    from placerec.vision import DictionarySetOptions, train_dictionary
-
-    options = DictionarySetOptions(**{field.name: how.pop(field.name) for field in fields(DictionarySetOptions)})
     with shared.progress_bar("describe") as progress:
-        train_dictionary(sources, out, options=options, progress=progress, **how)
+        train_dictionary(sources, out, options=words, progress=progress, **how)
 
 
 @click.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")

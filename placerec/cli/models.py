@@ -1,5 +1,6 @@
 """Models of places, and what they believe: from `placerec train-lm` and `update` to `decode` and `evaluate`."""
 
+import functools
 import json
 import sys
 from contextlib import closing
@@ -13,8 +14,7 @@ from click.core import ParameterSource
 from placerec.cli import shared
 
 if TYPE_CHECKING:
-    from placerec.jobs import Executor
-    from placerec.model import Decoding
+    from placerec.model import Decoding, ModelOptions
 
 # The names of placerec.lm.SMOOTHINGS and of placerec.methods.METHODS, written out: --help would wait for numpy.
 SMOOTHING_NAMES = tuple(
@@ -42,51 +42,89 @@ Example: placerec inspect model/kitchen.arpa "w07 w08"
 _model_argument = click.argument("model", metavar="MODEL/", type=shared.PATH)
 
 
+def model_options(function: shared.Command) -> shared.Command:
+    """--order, --smoothing and what else language models are made with. The command gets `options`."""
+
+    @click.option("--order", type=click.IntRange(1, 9), default=2, help="n-gram order; 1 is the classical HMM.")
+    @click.option(
+        "--smoothing",
+        type=click.Choice(SMOOTHING_NAMES),
+        default="witten-bell",
+        help="How unseen n-grams get their probability.",
+    )
+    @click.option(
+        "--delta",
+        type=shared.FiniteRange(0, min_open=True),
+        help="What lidstone adds to every count  [default: 1], or absolute takes off it  [default: 0.5].",
+    )
+    @click.option(
+        "--select",
+        default="none",
+        metavar="RULE",
+        help="Which words count: none (all), unique (one a run), subsample:S (one in S), compress:M (runs by M).",
+    )
+    @click.option(
+        "--min-count",
+        default="1",
+        metavar="N[,N...]|srilm",
+        help="Per order, how often an n-gram must occur to be listed; srilm is 1,1,2.",
+    )
+    @click.option("--markers/--no-markers", default=False, help="Whether to count <s> and </s> around visits.")
+    @functools.wraps(function)
+    def modelling(
+        *args: Any,
+        order: int,
+        smoothing: str,
+        delta: float | None,
+        select: str,
+        min_count: str,
+        markers: bool,
+        **options: Any,
+    ) -> Any:
+        from placerec.model import ModelOptions, parse_min_count
+        from placerec.words import parse_selection
+
+        with shared.usage("--min-count"):
+            minima = parse_min_count(min_count)
+        with shared.usage("--select"):
+            selection = parse_selection(select)
+        chosen = ModelOptions(order, smoothing, delta, minima, markers, selection)
+        return function(*args, options=chosen, **options)
+
+    return modelling
+
+
 @click.command("train-lm", epilog="Example: placerec train-lm tokens/seq*[12].tsv -o model/ --order 2")
 @shared.tokens_argument
-@click.option("--order", type=click.IntRange(1, 9), default=2, help="n-gram order; 1 is the classical HMM.")
+@model_options
 @click.option(
-    "--smoothing",
-    type=click.Choice(SMOOTHING_NAMES),
-    default="witten-bell",
-    help="How unseen n-grams get their probability.",
-)
-@click.option(
-    "--delta",
-    type=shared.FiniteRange(0, min_open=True),
-    help="What lidstone adds to every count  [default: 1], or absolute takes off it  [default: 0.5].",
-)
-@click.option(
-    "--select",
-    default="none",
-    metavar="RULE",
-    help="Which words count: none (all), unique (one a run), subsample:S (one in S), compress:M (runs by M).",
-)
-@click.option(
-    "--min-count",
-    default="1",
-    metavar="N[,N...]|srilm",
-    help="Per order, how often an n-gram must occur to be listed; srilm is 1,1,2.",
-)
-@click.option("--markers/--no-markers", default=False, help="Whether to count <s> and </s> around visits.")
-@click.option(
-    "--vocab", metavar="FILE", type=shared.PATH, help="All words, one a line.  [default: vocab.txt beside TOKENS]"
+    "--vocab",
+    "vocabulary",
+    metavar="FILE",
+    type=shared.PATH,
+    help="All words, one a line.  [default: vocab.txt beside TOKENS]",
 )
 @click.option(
     "--as-in-paper", is_flag=True, help="Train on the first dictionary alone, and learn nothing of how words weigh."
 )
+@click.option(
+    "--descriptors",
+    metavar="FILE.npz",
+    type=shared.PATH,
+    help="The frames' descriptors: the weight of words is judged with words that are learned anew, too; needs -w.",
+)
+@shared.words_option(False, "The dictionaries of TOKENS, for --descriptors.")
 @shared.output_option("MODEL/", "The folder to write: one ARPA file per place, and what made it.")
 @shared.cluster_option
 @shared.talk_options
 def train_lm(
     tokens: tuple[Path, ...],
-    select: str,
-    min_count: str,
-    vocab: Path | None,
+    descriptors: Path | None,
+    words: Path | None,
     as_in_paper: bool,
     out: Path,
-    work: "Executor | None",
-    **options: Any,
+    options: "ModelOptions",
+    **how: Any,
 ) -> None:
     """Train one n-gram model per place, as ARPA files.
 
@@ -95,16 +133,17 @@ def train_lm(
 
     TOKENS are token streams (.tsv), folders of them, or one folder of sentences: PLACE.txt, one visit a line.
     """
-    from placerec.model import ModelOptions, parse_min_count, train_lm as run
-    from placerec.words import parse_selection
+    from placerec.model import train_lm as run
 
-    with shared.usage("--min-count"):
-        minima = parse_min_count(min_count)
-    with shared.usage("--select"):
-        selection = parse_selection(select)
-    chosen = ModelOptions(min_count=minima, select=selection, **options)
+    if (descriptors is None) != (words is None) or (descriptors and as_in_paper):
+        raise click.UsageError("--descriptors and -w belong together, and --as-in-paper weighs nothing")
+    weigh = None
+    if descriptors and words:
+        from placerec.model.learn import weigher
+
+        weigh = weigher(tokens, words, descriptors, options)
     with shared.progress_bar("train-lm") as progress:
-        run(tokens, out, options=chosen, vocabulary=vocab, as_in_paper=as_in_paper, work=work, progress=progress)
+        run(tokens, out, options=options, as_in_paper=as_in_paper, weigh=weigh, progress=progress, **how)
 
 
 @click.command(epilog="Example: placerec update model/ tokens/today.tsv")

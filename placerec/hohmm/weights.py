@@ -26,12 +26,14 @@ _SMALLEST_BELIEF = 1e-15
 class Weights:
     """The exponent `alpha` of words' probabilities and the filter's `memory`.
 
-    `log_loss`: nats per frame that they leave on `frames` held-out ones; None where there was nothing to choose by.
+    `log_loss`: nats per frame that they leave on `frames` held-out ones, and `unweighted` what alpha 1 and memory 0
+    leave; None where there was nothing to choose by.
     """
 
     alpha: float
     memory: float
     log_loss: float | None = None
+    unweighted: float | None = None
     frames: int = 0
 
 
@@ -69,8 +71,10 @@ def choose_weights(sequences: Iterable[HeldOut], dictionaries: int) -> Weights:
     if not frames:
         return Weights(1 / dictionaries, 0.0)
     memory, alpha = np.unravel_index(int(total.argmin()), total.shape)
+    unweighted = total[MEMORIES.index(0.0), ALPHAS.index(1.0)]
     # Six digits: a file to read, and the last bits of a sum differ from machine to machine.
-    return Weights(ALPHAS[alpha], MEMORIES[memory], float(f"{total.min() / frames:.6g}"), frames)
+    told = [float(f"{loss / frames:.6g}") for loss in (total.min(), unweighted)]
+    return Weights(ALPHAS[alpha], MEMORIES[memory], told[0], told[1], frames)
 
 
 def losses(sequence: HeldOut) -> Floats:

@@ -8,7 +8,8 @@ MODEL/counts/PLACE.counts    the counts
 MODEL/nonevents.txt          without markers: what the `ngram-count` commands need to leave </s> out
 MODEL/DICTIONARY/            the models of a further dictionary: a folder such as this one
 
-What `learn` made the models of is there, too: MODEL/words.npz and MODEL/tokens/.
+What `learn` made the models of is there, too: MODEL/words.npz and MODEL/tokens/, and what they say of its tests:
+MODEL/beliefs/.
 """
 
 import json
@@ -37,8 +38,8 @@ from placerec.words.stream import FIRST, column_of, dictionary_in
 
 FORMAT = "placerec model 1"
 MODEL_JSON = "model.json"
-WORDS, TOKENS = "words.npz", "tokens"
-OWNED = ("*.arpa", MODEL_JSON, VOCABULARY, "nonevents.txt", "sentences", "counts", WORDS, TOKENS)
+WORDS, TOKENS, BELIEFS = "words.npz", "tokens", "beliefs"
+OWNED = ("*.arpa", MODEL_JSON, VOCABULARY, "nonevents.txt", "sentences", "counts", WORDS, TOKENS, BELIEFS)
 _RETRAIN, _RECALIBRATE = "train the model again", "run `placerec calibrate` again"
 
 
@@ -133,10 +134,10 @@ class LearnedEvidence:
         weights = self.weights
         chosen = f"alpha {weights.alpha:g}, memory {weights.memory:g}"
         if weights.log_loss is None:
-            return f"{chosen}: {self.sequences} sequence, and none to choose by"
+            return f"{chosen}: there is nothing to choose by with {self.sequences} labelled sequence(s)"
         return (
-            f"{chosen}: log loss {weights.log_loss:.3f} on {weights.frames} frames of {self.sequences} sequences, "
-            "each group of them judged by the others"
+            f"{chosen}: log loss {weights.log_loss:.3f} instead of {weights.unweighted:.3f} on {weights.frames} frames "
+            f"of {self.sequences} sequences, each group of them judged by the others"
         )
 
     @property
@@ -151,6 +152,7 @@ class LearnedEvidence:
             "alpha": weights.alpha,
             "memory": weights.memory,
             "log_loss": weights.log_loss,
+            "unweighted_log_loss": weights.unweighted,
             "judged": weights.frames,
             "sequences": self.sequences,
             "redone": "words, models, transitions" if self.words else "models, transitions",
@@ -161,11 +163,12 @@ class LearnedEvidence:
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], places: Sequence[str]) -> "LearnedEvidence":
         """What `as_dict` gave; ValueError, KeyError, TypeError or AttributeError for anything else."""
-        loss = values["log_loss"]
+        best, unweighted = (values[key] for key in ("log_loss", "unweighted_log_loss"))
         weights = Weights(
             float(values["alpha"]),
             float(values["memory"]),
-            None if loss is None else float(loss),
+            None if best is None else float(best),
+            None if unweighted is None else float(unweighted),
             _count(values["judged"]),
         )
         if not (0 < weights.alpha < math.inf and 0 <= weights.memory <= 1):

@@ -2,20 +2,21 @@
 
 import logging
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 from placerec.errors import LanguageModelError, ModelError
 from placerec.files import whole_folder, write_text
 from placerec.frames.places import check_place, check_twins
+from placerec.hohmm.weights import Weights
 from placerec.jobs import Executor, Progress
 from placerec.lm import NgramCounts, count_ngrams, format_counts, write_arpa
 from placerec.lm.counts import count_texts
 from placerec.lm.vocabulary import SENTENCE_END
 from placerec.model.corpus import dictionaries_in, gather_corpus, holds_sentences
 from placerec.model.evidence import learn_weights
-from placerec.model.folder import LearnedEvidence, ModelDescription, ModelFolder, owned_by
+from placerec.model.folder import MODEL_JSON, LearnedEvidence, ModelDescription, ModelFolder, owned_by
 from placerec.model.options import ModelOptions, estimate_place
 from placerec.model.record import Record
 from placerec.words import Sentences, each_sentence, format_sentences, read_stream, write_vocabulary
@@ -32,52 +33,73 @@ def train_lm(
     options: ModelOptions = ModelOptions(),
     vocabulary: Path | str | None = None,
     as_in_paper: bool = False,
+    weigh: Callable[[], Weights] | None = None,
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> None:
     """`placerec train-lm`: read token streams or sentences (see `gather_corpus`) and write a MODEL/ folder.
 
-    Of token streams with words of several dictionaries each gets its models, and how much all of them weigh is learned
-    (`learn_weights`). `as_in_paper`: the first dictionary alone, and nothing is learned of weights. Memory holds the
-    model of one place and one stream; the sentences go to their files as they are read. `work`: as for `train_model`.
+    Of token streams with words of several dictionaries each gets its models, and how much all of them weigh is learned:
+    by `weigh` (such as `placerec.model.learn.learn_weights_anew`), or from the token streams alone (`learn_weights`).
+    `as_in_paper`: the first dictionary alone, and nothing is learned of weights. Memory holds the model of one place
+    and one stream; the sentences go to their files as they are read. `work`: as for `train_model`.
     """
     options.check()
-    names = dictionaries_in(tokens)[: 1 if as_in_paper else None]
     with whole_folder(Path(out), owned_by(Path(out))) as path:
         folder = ModelFolder(path)
-        folders = {name: folder.of(name) for name in names}
-        for own in folders.values():
-            (own.path / "sentences").mkdir(parents=True)
-
-        def keep(dictionary: str, place: str, text: Sentences) -> None:
-            with folders[dictionary].place(place).sentences.open("ab") as file:
-                file.write(format_sentences(text).encode())
-
-        gathered = gather_corpus(tokens, keep, selection=options.select, vocabulary=vocabulary, dictionaries=names)
-        for name, (words, record) in gathered.items():
-            if not record.places:
-                raise ModelError(NO_PLACE)
-            texts = {place: each_sentence(folders[name].place(place).sentences) for place in record.places}
-            counts = _counted(texts.values(), words, options, work)
-            write_model(folders[name], record.places, record.places, counts, words, options, record, progress)
-        evidence = None
-        if not as_in_paper and not holds_sentences(tokens):
-            evidence = _learn_evidence(tokens, gathered, options)
-            folder.describe(evidence=evidence.as_dict())
-    log.info("%s: %d places, order %d, %s", out, len(texts), options.order, options.smoothing)
+        evidence = train_folder(
+            folder, tokens, options, vocabulary, as_in_paper=as_in_paper, weigh=weigh, work=work, progress=progress
+        )
+        places = ModelDescription.read(path / MODEL_JSON).places
+    log.info("%s: %d places, order %d, %s", out, len(places), options.order, options.smoothing)
     if evidence is not None:
         log.info("%s", evidence)
 
 
-def _learn_evidence(
-    tokens: Sequence[Path | str], gathered: Mapping[str, tuple[Sequence[str], Record]], options: ModelOptions
-) -> LearnedEvidence:
+def train_folder(
+    folder: ModelFolder,
+    tokens: Sequence[Path | str],
+    options: ModelOptions,
+    vocabulary: Path | str | None = None,
+    *,
+    as_in_paper: bool = False,
+    weigh: Callable[[], Weights] | None = None,
+    work: Executor | None = None,
+    progress: Progress | None = None,
+) -> LearnedEvidence | None:
+    """Write the models and what goes with them into a folder that is there; what was learned of weights, if anything.
+
+    Arguments and errors are those of `train_lm`.
+    """
+    names = dictionaries_in(tokens)[: 1 if as_in_paper else None]
+    folders = {name: folder.of(name) for name in names}
+    for own in folders.values():
+        (own.path / "sentences").mkdir(parents=True)
+
+    def keep(dictionary: str, place: str, text: Sentences) -> None:
+        with folders[dictionary].place(place).sentences.open("ab") as file:
+            file.write(format_sentences(text).encode())
+
+    gathered = gather_corpus(tokens, keep, selection=options.select, vocabulary=vocabulary, dictionaries=names)
+    for name, (words, record) in gathered.items():
+        if not record.places:
+            raise ModelError(NO_PLACE)
+        texts = (each_sentence(folders[name].place(place).sentences) for place in record.places)
+        counts = _counted(texts, words, options, work)
+        write_model(folders[name], record.places, record.places, counts, words, options, record, progress)
+    if as_in_paper or holds_sentences(tokens):
+        return None
     files = stream_files(tokens)
-    vocabularies = {name: words for name, (words, _) in gathered.items()}
-    weights = learn_weights([partial(read_stream, path) for path in files], vocabularies, options)
+    if weigh is None:
+        vocabularies = {name: words for name, (words, _) in gathered.items()}
+        weights = learn_weights([partial(read_stream, path) for path in files], vocabularies, options)
+    else:
+        weights = weigh()
     fingerprints = {name: record.dictionary for name, (_, record) in gathered.items()}
     frames = Counter(place for stream in each_stream(files) for place in stream.places if place)
-    return LearnedEvidence(weights, len(files), dict(sorted(frames.items())), fingerprints)
+    evidence = LearnedEvidence(weights, len(files), dict(sorted(frames.items())), fingerprints, weigh is not None)
+    folder.describe(evidence=evidence.as_dict())
+    return evidence
 
 
 def train_model(

@@ -3,7 +3,7 @@
 import hashlib
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from placerec.vision.dictionary import (
 from placerec.vision.learning import TrainingRows, learn_map, training_rows, warn_of_few
 from placerec.vision.lookup import Lookup
 from placerec.vision.options import DictionarySetOptions
-from placerec.vision.pca import Pca, fit_pca, moments, projected
+from placerec.vision.pca import Pca, fit_pca, is_orthonormal, moments, projected
 from placerec.vision.som import EpochProgress, MapQuality
 from placerec.vision.spec import DescriptorSpec, descriptor
 from placerec.vision.views import place_normalised, place_numbers
@@ -107,6 +107,17 @@ class DictionarySet:
             named = ", ".join(self.names[1:]) or "no other dictionary"
             raise VisionError(f"no dictionary is called {name!r}; there is the first, without a name, and {named}")
         return self.dictionaries[self.names.index(name)]
+
+    @property
+    def options(self) -> DictionarySetOptions:
+        """The options that such a set is learned with."""
+        views = ["plain" if is_orthonormal(one.pca) else "pn" for one in self.dictionaries]
+        training = [one.training for one in self.dictionaries]
+        rest = asdict(training[0])
+        rest.pop("size")
+        return DictionarySetOptions(
+            tuple(dict.fromkeys(views)), tuple(dict.fromkeys(one.size for one in training)), **rest
+        )
 
     @property
     def spec(self) -> DescriptorSpec:

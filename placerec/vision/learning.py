@@ -54,7 +54,7 @@ def training_rows(descriptors: Source, spec: DescriptorSpec, options: Dictionary
     n = len(source) if isinstance(source, np.ndarray) else sum(map(len, chunks(source)))
     kept = np.zeros(n, np.bool_)
     kept[rng.permutation(n)[: max(1, round(options.fraction * n))]] = True
-    return TrainingRows(_kept(source, kept), kept, rng)
+    return TrainingRows(some_rows(source, kept), kept, rng)
 
 
 def warn_of_few(frames: int, *sizes: int) -> None:
@@ -115,7 +115,7 @@ def checked_rows(descriptors: Singles, spec: DescriptorSpec, first: int = 0) -> 
     return rows
 
 
-def _kept(source: Source, kept: Mask) -> Stream:
+def some_rows(source: Source, kept: Mask) -> Stream:
     """Some rows of a source, in their order."""
 
     def pieces() -> Iterator[Singles]:

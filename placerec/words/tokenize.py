@@ -14,7 +14,8 @@ from placerec.frames.images import Batch
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal
-from placerec.vision import Descriptors, Dictionary, DictionarySet, describe
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionarySet, describe
+from placerec.vision.chunks import Source, chunks
 from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
 from placerec.words.folder import OWNED, fill_folder
 from placerec.words.stream import WordColumn, WordStream
@@ -69,12 +70,26 @@ def streams_of(
 
 def tokens_of(descriptors: Descriptors, dictionary: Dictionary | DictionarySet) -> list[WordStream]:
     """The token streams of described frames, one per sequence."""
-    dictionaries = DictionarySet.of(dictionary)
-    found = dictionaries.words(descriptors)
-    return [
-        _stream(descriptors.table.take(rows), dictionaries, [(units[rows], far[rows]) for units, far in found])
-        for rows in descriptors.table.by_sequence().values()
-    ]
+    return streams_of_rows(descriptors.values, descriptors.table, DictionarySet.of(dictionary), descriptors.spec)
+
+
+def streams_of_rows(
+    values: Source, table: FrameTable, dictionaries: DictionarySet, spec: DescriptorSpec | None = None
+) -> list[WordStream]:
+    """The token streams of the frames in `table`, one per sequence, given their descriptors, in memory or streamed.
+
+    `spec`: of the descriptors; VisionError if it is another than that of the dictionaries.
+    """
+    pieces: dict[str, list[WordStream]] = {}
+    first = 0
+    for rows in chunks(values):
+        part = table.take(slice(first, first + len(rows)))
+        first += len(rows)
+        found = dictionaries.words(rows if spec is None else Descriptors(spec, rows, part))
+        for name, own in part.by_sequence().items():
+            words = [(units[own], far[own]) for units, far in found]
+            pieces.setdefault(name, []).append(_stream(part.take(own), dictionaries, words))
+    return [WordStream.concat(parts) for parts in pieces.values()]
 
 
 def _stream(table: FrameTable, dictionaries: DictionarySet, found: Iterable[tuple[Ints, Singles]]) -> WordStream:

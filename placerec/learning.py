@@ -1,0 +1,83 @@
+"""`placerec learn`: words, models and the weight of words from images, and how good they are on sequences kept back."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from placerec.evaluation.metrics import Evaluation, evaluate
+from placerec.frames import SourceOptions
+from placerec.jobs import Executor, Progress
+from placerec.methods import decode
+from placerec.model import ModelOptions
+from placerec.model.folder import BELIEFS, LearnedEvidence
+from placerec.model.learn import learn_model
+from placerec.vision import DescriptorSpec, DictionarySet, DictionarySetOptions
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What `learn` made: dictionaries, the weight of their words, and the judgement of the tests, if any."""
+
+    out: Path
+    dictionaries: DictionarySet
+    evidence: LearnedEvidence
+    evaluation: Evaluation | None
+
+
+def learn(
+    sources: Iterable[Path | str],
+    out: Path | str,
+    *,
+    test: Iterable[Path | str] = (),
+    spec: DescriptorSpec | None = None,
+    matrix: Path | str | None = None,
+    source_options: SourceOptions = SourceOptions(),
+    words: DictionarySetOptions = DictionarySetOptions(),
+    options: ModelOptions = ModelOptions(),
+    work: Executor | None = None,
+    progress: Progress | None = None,
+) -> Learned:
+    """`placerec learn`: write the MODEL/ folder `out` (`placerec.model.learn.learn_model`), and decode the sequences `test`.
+
+    These train nothing, though `sources` may name them; the beliefs in them go to MODEL/beliefs/. Other arguments, and
+    what is raised: see `placerec.model.learn.learn_model`, and `placerec.methods.decode`.
+    """
+    path, tests = Path(out), list(test)
+    evidence = learn_model(
+        sources,
+        path,
+        spec=spec,
+        matrix=matrix,
+        source_options=source_options,
+        words=words,
+        options=options,
+        left_out=tests,
+        work=work,
+        progress=progress,
+    )
+    evaluation = None
+    if tests:
+        beliefs = decode(tests, path, out=path / BELIEFS, source_options=source_options, progress=progress)
+        evaluation = evaluate(beliefs)
+    return Learned(path, DictionarySet.load(path / "words.npz"), evidence, evaluation)
+
+
+def format_learned(learned: Learned) -> str:
+    """What was chosen and why, in five lines at most."""
+    made, evidence = learned.dictionaries, learned.evidence
+    quality = made.dictionaries[0].quality
+    sizes = ", ".join(f"{len(one.hits)} ({one.name or 'the first'})" for one in made.dictionaries)
+    lines = [
+        f"words     {sizes}: learned from {quality.used} frames of {len(made.sequences)} sequences",
+        f"places    {len(evidence.frames)}: " + ", ".join(f"{place} {n}" for place, n in evidence.frames.items()),
+        f"weights   {evidence}",
+    ]
+    found = learned.evaluation
+    if found is not None:
+        loss, majority = found.log_loss, found.majority_accuracy
+        lines.append(
+            f"tests     accuracy {100 * found.accuracy:.1f} % (majority class {100 * majority:.1f} %), log loss "
+            f"{loss:.3f}, ECE {found.ece:.3f} on {found.frames} frames of {len(found.sequences)} sequences"
+        )
+    lines.append(f"model     {learned.out}: `placerec decode SOURCE -m {learned.out}` needs nothing else")
+    return "\n".join(lines)

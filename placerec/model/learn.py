@@ -1,0 +1,153 @@
+"""From images to a MODEL/ folder in one go, every frame described once: `placerec learn`.
+
+The weight of words is judged with everything made anew without the sequences that judge: components, maps, models and
+transitions. That costs as many trainings as there are groups of sequences, and needs the descriptors.
+"""
+
+import logging
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from placerec.errors import ModelError, VisionError
+from placerec.files import whole_folder
+from placerec.frames import SourceOptions, find_sequences
+from placerec.frames.table import FrameTable
+from placerec.hohmm.weights import HeldOut, Weights
+from placerec.jobs import Executor, Progress
+from placerec.journal import open_journal
+from placerec.model.evidence import chosen, count_places, group_borders, held_out
+from placerec.model.folder import TOKENS, LearnedEvidence, ModelFolder, owned_by
+from placerec.model.options import ModelOptions
+from placerec.model.train import train_folder
+from placerec.vision import Descriptors, DescriptorSpec, DictionarySet, DictionarySetOptions, describe
+from placerec.vision.chunks import Source
+from placerec.vision.describe import keep_described
+from placerec.vision.external import read_rows
+from placerec.vision.learning import some_rows
+from placerec.words import WordStream
+from placerec.words.folder import each_stream, fill_folder, stream_files
+from placerec.words.tokenize import streams_of_rows
+
+log = logging.getLogger(__name__)
+
+
+def learn_model(
+    sources: Iterable[Path | str],
+    out: Path | str,
+    *,
+    spec: DescriptorSpec | None = None,
+    matrix: Path | str | None = None,
+    source_options: SourceOptions = SourceOptions(),
+    words: DictionarySetOptions = DictionarySetOptions(),
+    options: ModelOptions = ModelOptions(),
+    left_out: Iterable[Path | str] = (),
+    work: Executor | None = None,
+    progress: Progress | None = None,
+) -> LearnedEvidence:
+    """Learn words, models and the weight of words from image sources, and write the MODEL/ folder `out`.
+
+    It holds words.npz and tokens/ beside what `train-lm` writes: all files are those that `train-words`, `tokenize` and
+    `train-lm -w --descriptors` write. `left_out`: sequences that are to train nothing, though `sources` may name them.
+    `spec`, `matrix`, `work`, `progress`: see `placerec.vision.describe`; a run that was killed goes on from what it had
+    described. `words`, `options`: of the dictionaries and of the models. Raises what these steps raise.
+    """
+    options.check()
+    with whole_folder(Path(out), owned_by(Path(out))) as path, open_journal(Path(out)) as journal:
+        kept_back = {one.source.resolve() for one in find_sequences(left_out, options=source_options)}
+        sequences = [
+            one for one in find_sequences(sources, options=source_options) if one.source.resolve() not in kept_back
+        ]
+        if not sequences:
+            raise ModelError("every sequence is to be left out, and none remains to learn from; name others")
+        values: Source
+        if matrix is not None:
+            found = describe(sequences, spec, matrix=matrix)
+            spec, values, table = found.spec, found.values, found.table
+        else:
+            spec = spec or DescriptorSpec()
+            kept = keep_described(sequences, spec, journal, work, progress)
+            values, table = kept.values.pieces, kept.table
+        made = DictionarySet.fit(values, spec=spec, places=table.places, options=words, work=work)
+        names = tuple(one.name for one in sequences)
+        made = DictionarySet(tuple(replace(one, sequences=names) for one in made.dictionaries))
+        folder = ModelFolder(path)
+        made.save(folder.words)
+        (path / TOKENS).mkdir()
+        fill_folder(streams_of_rows(values, table, made), made, path / TOKENS)
+        weigh = partial(learn_weights_anew, values, table, spec, made.options, options, work)
+        evidence = train_folder(folder, [path / TOKENS], options, weigh=weigh)
+    if evidence is None:
+        raise ModelError(f"{out}: nothing was learned")
+    return evidence
+
+
+def learn_weights_anew(
+    values: Source,
+    table: FrameTable,
+    spec: DescriptorSpec,
+    words: DictionarySetOptions,
+    options: ModelOptions,
+    work: Executor | None = None,
+) -> Weights:
+    """The weights of words, with words, models and transitions redone without each group of sequences in turn.
+
+    `values`: the descriptors of the frames in `table`, in memory or streamed. With fewer than two sequences, or where
+    nothing can be learned from fewer: alpha 1 / dictionaries, memory 0.
+    """
+    rows = table.by_sequence()
+    names = list(rows)
+    dictionaries = len(words.views) * len(words.sizes)
+
+    def held() -> Iterator[HeldOut]:
+        for group in group_borders(len(names)):
+            left = np.zeros(len(table), bool)
+            left[np.concatenate([rows[name] for name in names[group]])] = True
+            training = some_rows(values, ~left)
+            others = table.take(~left)
+            with _unsaid():
+                made = DictionarySet.fit(training, spec=spec, places=others.places, options=words, work=work)
+            vocabularies = {one.name: one.vocabulary for one in made.dictionaries}
+            counts = count_places(streams_of_rows(training, others, made), vocabularies, options)
+            streams = streams_of_rows(some_rows(values, left), table.take(left), made)
+            yield from held_out(counts, streams, vocabularies, options)
+
+    try:
+        return chosen(held(), dictionaries)
+    except VisionError as error:
+        log.warning("the weight of words cannot be learned: without some of the sequences, %s", error)
+        return chosen([], dictionaries)
+
+
+@contextmanager
+def _unsaid() -> Iterator[None]:
+    """What was noted of the dictionaries of all sequences is not noted again of some of them."""
+    notes = logging.getLogger("placerec.vision")
+    level = notes.level
+    notes.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        notes.setLevel(level)
+
+
+def weigher(
+    tokens: Sequence[Path | str], words: Path | str, descriptors: Path | str, options: ModelOptions
+) -> "partial[Weights]":
+    """What learns the weights of token streams as `learn` does, given their words.npz and their descriptors.
+
+    `descriptors`: an .npz of `placerec describe` that has a row for every frame. Raises VisionError for a file that
+    cannot be used.
+    """
+    made = DictionarySet.load(words)
+    streams: list[WordStream] = list(each_stream(stream_files(tokens)))
+    table = FrameTable.concat(stream.table for stream in streams)
+    values, kept = read_rows(Path(descriptors), list(zip(table.sequences, table.names, strict=True)))
+    if len(kept) < len(table):
+        raise VisionError(f"{descriptors}: has rows for {len(kept)} of the {len(table)} frames; describe all of them")
+    found = Descriptors(made.spec, values, table)
+    return partial(learn_weights_anew, found.values, table, made.spec, made.options, options)
