@@ -131,6 +131,7 @@ __all__ = [
     "gist",
     "inspect_decision",
     "inspect_model",
+    "learn",
     "learned_transition",
     "load_decoder",
     "load_recognizer",

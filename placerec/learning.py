@@ -37,10 +37,10 @@ def learn(
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> Learned:
-    """`placerec learn`: write the MODEL/ folder `out` (`placerec.model.learn.learn_model`), and decode the sequences `test`.
+    """`placerec learn`: write the MODEL/ folder `out` (`placerec.model.learn.learn_model`), and decode `test`.
 
-    These train nothing, though `sources` may name them; the beliefs in them go to MODEL/beliefs/. Other arguments, and
-    what is raised: see `placerec.model.learn.learn_model`, and `placerec.methods.decode`.
+    These sequences train nothing, though `sources` may name them; the beliefs in them go to MODEL/beliefs/. Other
+    arguments, and what is raised: see `placerec.model.learn.learn_model`, and `placerec.methods.decode`.
     """
     path, tests = Path(out), list(test)
     evidence = learn_model(

@@ -134,7 +134,7 @@ class LearnedEvidence:
         weights = self.weights
         chosen = f"alpha {weights.alpha:g}, memory {weights.memory:g}"
         if weights.log_loss is None:
-            return f"{chosen}: there is nothing to choose by with {self.sequences} labelled sequence(s)"
+            return f"{chosen}: not tried, for that takes several labelled sequences"
         return (
             f"{chosen}: log loss {weights.log_loss:.3f} instead of {weights.unweighted:.3f} on {weights.frames} frames "
             f"of {self.sequences} sequences, each group of them judged by the others"
