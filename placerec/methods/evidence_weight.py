@@ -1,69 +1,52 @@
 """The filter over points whose evidence has a weight, and which does not remember for ever: both are learned.
 
-With A the transitions and pi the places' shares, the belief in place c is in proportion to p(point | c)^alpha times
-(1 - memory) sum over c' of b(c') A(c', c) + memory pi(c). Neighbouring frames are alike, and count as less than one
-each; what the filter took for true long ago fades. Both numbers are those with the least mean -log b(true place) on
-training sequences that were held out, five groups of them at most, for which likelihoods, transitions and shares are
-learned without each; of a single sequence nothing is held out, and both stay 1 and 0. (The components of the points are
-those of all training sequences.)
+As for words (`hohmm.weights`): a point's likelihoods count to the power of alpha, and at each step the filter replaces
+the share `memory` of its belief by the places' shares. Both have the least log loss on training sequences that were
+held out, five groups of them at most, for which likelihoods, transitions and shares are learned without each; of a
+single sequence nothing is held out, and they stay 1 and 0. (The components of the points are those of all training
+sequences.)
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
-from placerec.arrays import Floats, Ints, Mask
-from placerec.hohmm import Transition, filter_stream, learned_transition
+from placerec.arrays import Mask
+from placerec.hohmm import learned_transition
+from placerec.hohmm.evidence import Evidence
+from placerec.hohmm.weights import HeldOut, Weights, choose_weights, shares_of
 from placerec.lm.logs import LN10
-from placerec.methods.descriptors import (
-    DescriptorTrainingSet,
-    FitPoints,
-    MakePointStepper,
-    filtered,
-    held_out_folds,
-)
-
-ALPHAS = (1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.09, 0.06, 0.04, 0.03, 0.02, 0.01)
-MEMORIES = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0)
-GROUPS = 5
-_SMALLEST_BELIEF = 1e-15
+from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints, MakePointStepper, filtered, held_out_folds
+from placerec.model.evidence import GROUPS
 
 
 def fit(training: DescriptorTrainingSet, likelihoods: FitPoints) -> MakePointStepper:
     """Beliefs of the filter over `likelihoods`, weighed as the training asks for."""
-    alpha, memory = best_weights(training, likelihoods)
-    of_point = likelihoods(training)
-    return filtered(lambda point: alpha * of_point(point), fading(training, memory))
+    weights, of_point = best_weights(training, likelihoods), likelihoods(training)
+    shares = shares_of(np.bincount(training.truth, minlength=len(training.places)))
+    return filtered(
+        lambda point: weights.alpha * of_point(point), learned_transition(training.steps, weights.memory, shares)
+    )
 
 
-def fading(training: DescriptorTrainingSet, memory: float) -> Transition:
-    """Transitions a frame that forget: (1 - memory) A + memory pi in every row."""
-    frames, places = np.bincount(training.truth, minlength=len(training.places)), len(training.places)
-    shares = (frames + 1 / places) / (frames.sum() + 1)
-    learned = learned_transition(training.steps)
-    return Transition((1 - memory) * learned.matrix + memory * shares, learned.per)
+def best_weights(training: DescriptorTrainingSet, likelihoods: FitPoints) -> Weights:
+    """The weights with the least log loss on held-out training sequences."""
+    several = len(np.unique(training.sequences)) > 1
+    return choose_weights(_held_out(training, likelihoods) if several else (), 1)
 
 
-def best_weights(training: DescriptorTrainingSet, likelihoods: FitPoints) -> tuple[float, float]:
-    """The alpha and the memory with the least log loss on held-out training sequences; the first of equals."""
-    ways = list(product(ALPHAS, MEMORIES))
-    if len(np.unique(training.sequences)) == 1:
-        return 1.0, 0.0
-    loss = np.zeros(len(ways))
+def _held_out(training: DescriptorTrainingSet, likelihoods: FitPoints) -> Iterator[HeldOut]:
     for held in held_out_folds(training.sequences, GROUPS):
         rest = without(training, held)
-        of_point, known = likelihoods(rest), np.isin(training.truth, rest.truth)
-        transitions = {memory: fading(rest, memory) for memory in MEMORIES}
+        of_point, frames = likelihoods(rest), np.bincount(rest.truth, minlength=len(rest.places))
         for sequence in np.unique(training.sequences[held]):
             rows = np.flatnonzero(training.sequences == sequence)
             log10_p = np.array([of_point(point) for point in training.points[rows]]) / LN10
-            judged, truth = known[rows], training.truth[rows]
-            loss += [
-                _log_loss(filter_stream(alpha * log10_p, transitions[memory]).belief[judged], truth[judged])
-                for alpha, memory in ways
-            ]
-    return ways[int(loss.argmin())]
+            every, elapsed = np.ones(len(rows), bool), np.minimum(np.arange(len(rows)), 1.0)
+            truth = np.where(frames[training.truth[rows]], training.truth[rows], -1)
+            evidence = Evidence(every, np.arange(len(rows)), log10_p[None], elapsed)
+            yield HeldOut(evidence, truth, rest.steps, shares_of(frames))
 
 
 def without(training: DescriptorTrainingSet, held: Mask) -> DescriptorTrainingSet:
@@ -73,9 +56,3 @@ def without(training: DescriptorTrainingSet, held: Mask) -> DescriptorTrainingSe
     together = sequences[1:] == sequences[:-1]
     np.add.at(steps, (truth[:-1][together], truth[1:][together]), 1)
     return replace(training, points=training.points[~held], truth=truth, sequences=sequences, steps=steps)
-
-
-def _log_loss(belief: Floats, truth: Ints) -> float:
-    """The sum of -log b(true place) over frames (m, C) with their places (m,)."""
-    loss: float = -np.log(np.maximum(belief[np.arange(len(truth)), truth], _SMALLEST_BELIEF)).sum().item()
-    return loss

@@ -8,10 +8,10 @@ from placerec.arrays import Floats, Ints
 from placerec.errors import check_optional
 from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints
 from placerec.methods.margins import FitMargins, Margins, best_machine, linear_margins
+from placerec.model.evidence import GROUPS
 
 # scikit-learn's C, for points in units of their root mean square; the first where nothing can be held out.
 STRENGTHS = (10.0, 0.1, 1.0, 100.0, 1000.0)
-GROUPS = 5
 MOST_FRAMES = 2000
 
 

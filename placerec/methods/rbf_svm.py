@@ -12,8 +12,9 @@ import numpy as np
 from placerec.arrays import Floats, Ints
 from placerec.errors import check_optional
 from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints
-from placerec.methods.logistic import GROUPS, MOST_FRAMES
+from placerec.methods.logistic import MOST_FRAMES
 from placerec.methods.margins import FitMargins, Margins, best_machine
+from placerec.model.evidence import GROUPS
 
 # scikit-learn's C and gamma, for points in units of their root mean square; the first where nothing can be held out.
 STRENGTHS = (10.0, 1.0, 100.0)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from helpers.point_clouds import clouds, steps_of
 
-from placerec.hohmm import filter_stream
+from placerec.hohmm import filter_stream, learned_transition
+from placerec.hohmm.weights import ALPHAS, MEMORIES, Weights
 from placerec.lm.logs import LN10
 from placerec.methods import evidence_weight
 from placerec.methods.descriptors import DescriptorTrainingSet, PointStepFunction, through_filter
-from placerec.methods.evidence_weight import ALPHAS, MEMORIES, best_weights, fading, without
+from placerec.methods.evidence_weight import best_weights, without
 
 Likelihoods = Callable[[DescriptorTrainingSet], PointStepFunction]
 
@@ -29,29 +30,17 @@ def told(sure: float, seen: list[int] | None = None) -> Likelihoods:
 
 def test_beliefs_are_those_of_the_filter_with_weighed_evidence_and_transitions_that_forget() -> None:
     training, test = clouds(1, apart=1.5), clouds(2, sequences=1, apart=1.5)
-    alpha, memory = best_weights(training, told(3.0))
-    of_point = told(3.0)(training)
-    log10_p = alpha * np.array([of_point(point) for point in test.points]) / LN10
-    expected = filter_stream(log10_p, fading(training, memory)).belief
+    weights, of_point = best_weights(training, told(3.0)), told(3.0)(training)
+    log10_p = weights.alpha * np.array([of_point(point) for point in test.points]) / LN10
+    shares = (np.bincount(training.truth) + 1 / 3) / (len(training.truth) + 1)
+    expected = filter_stream(log10_p, learned_transition(training.steps, weights.memory, shares)).belief
     step = evidence_weight.fit(training, told(3.0))()
     np.testing.assert_allclose(np.array([step(point) for point in test.points]), expected, atol=1e-9)
 
 
-def test_transitions_that_forget_are_learned_ones_and_shares() -> None:
-    training = clouds(1)
-    keep = ~((training.truth == 1) & (np.arange(90) % 2 == 0))
-    fewer = without(training, ~keep)
-    shares = (np.bincount(fewer.truth) + 1 / 3) / (len(fewer.truth) + 1)
-    counts = fewer.steps + 1 / 3
-    learned = counts / counts.sum(axis=1, keepdims=True)
-    np.testing.assert_allclose(fading(fewer, 0.0).matrix, learned)
-    np.testing.assert_allclose(fading(fewer, 0.3).matrix, 0.7 * learned + 0.3 * shares)
-    np.testing.assert_allclose(fading(fewer, 1.0).matrix, np.tile(shares, (3, 1)))
-
-
 def test_evidence_that_is_too_sure_gets_less_weight() -> None:
     training = clouds(1, sequences=6, apart=1.0)
-    weights = [best_weights(training, told(sure))[0] for sure in (0.5, 5.0, 50.0)]
+    weights = [best_weights(training, told(sure)).alpha for sure in (0.5, 5.0, 50.0)]
     assert weights[0] > weights[1] > weights[2]
     assert set(weights) <= set(ALPHAS)
 
@@ -64,9 +53,9 @@ def test_a_filter_that_is_caught_forgets() -> None:
     jumping = DescriptorTrainingSet(
         training.points[order], training.truth[order], training.sequences, training.places, training.steps
     )
-    assert best_weights(jumping, told(0.5))[1] > best_weights(training, told(0.5))[1]
-    assert best_weights(training, told(0.5))[1] < 1
-    assert {best_weights(one, told(0.5))[1] for one in (training, jumping)} <= set(MEMORIES)
+    assert best_weights(jumping, told(0.5)).memory > best_weights(training, told(0.5)).memory
+    assert best_weights(training, told(0.5)).memory < 1
+    assert {best_weights(one, told(0.5)).memory for one in (training, jumping)} <= set(MEMORIES)
 
 
 def test_all_is_learned_without_each_of_five_groups_at_most() -> None:
@@ -77,7 +66,7 @@ def test_all_is_learned_without_each_of_five_groups_at_most() -> None:
 
 def test_of_a_single_sequence_nothing_is_chosen() -> None:
     training = clouds(1, sequences=1)
-    assert best_weights(training, told(50.0)) == (1.0, 0.0)
+    assert best_weights(training, told(50.0)) == Weights(1.0, 0.0)
     plain, weighed = through_filter(training, told(50.0))(), evidence_weight.fit(training, told(50.0))()
     for point in training.points:
         np.testing.assert_allclose(weighed(point), plain(point))
