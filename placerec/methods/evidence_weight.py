@@ -1,24 +1,26 @@
-"""The filter over points whose evidence has a weight, and which does not remember for ever: both are learned.
+"""The filter of a peer whose evidence has a weight, and which does not remember for ever: both are learned.
 
-As for words (`hohmm.weights`): a point's likelihoods count to the power of alpha, and at each step the filter replaces
-the share `memory` of its belief by the places' shares. Both have the least log loss on training sequences that were
-held out, five groups of them at most, for which likelihoods, transitions and shares are learned without each; of a
-single sequence nothing is held out, and they stay 1 and 0. (The components of the points are those of all training
-sequences.)
+As in `hohmm.weights`: the likelihoods of a point or a word count to the power of alpha, and at each step the filter
+replaces the share `memory` of its belief by the places' shares. Both have the least log loss on training sequences that
+were held out, five groups of them at most, for which likelihoods, transitions and shares are learned without each; of a
+single sequence nothing is held out, and they stay 1 and 0. (Components and words are those of all training sequences.)
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from placerec.arrays import Mask
-from placerec.hohmm import learned_transition
-from placerec.hohmm.evidence import Evidence
+from placerec.hohmm import Emissions, learned_transition
+from placerec.hohmm.evidence import DictionaryModels, Evidence, evidence_in
 from placerec.hohmm.weights import HeldOut, Weights, choose_weights, shares_of
 from placerec.lm.logs import LN10
 from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints, MakePointStepper, filtered, held_out_folds
-from placerec.model.evidence import GROUPS
+from placerec.methods.training_set import TrainingSet, make_training_set
+from placerec.model.evidence import GROUPS, group_borders
+from placerec.words import Selection, WordStream, place_steps, sentences_per_place
+from placerec.words.stream import FIRST
 
 
 def fit(training: DescriptorTrainingSet, likelihoods: FitPoints) -> MakePointStepper:
@@ -56,3 +58,26 @@ def without(training: DescriptorTrainingSet, held: Mask) -> DescriptorTrainingSe
     together = sequences[1:] == sequences[:-1]
     np.add.at(steps, (truth[:-1][together], truth[1:][together]), 1)
     return replace(training, points=training.points[~held], truth=truth, sequences=sequences, steps=steps)
+
+
+def best_word_weights(
+    streams: Sequence[WordStream], vocabulary: Sequence[str], emissions: Callable[[TrainingSet], Emissions]
+) -> Weights:
+    """The weights of a method for words, which gets its `emissions` from a training set, by its training streams."""
+    return choose_weights(_streams_held_out(streams, vocabulary, emissions), 1)
+
+
+def _streams_held_out(
+    streams: Sequence[WordStream], vocabulary: Sequence[str], emissions: Callable[[TrainingSet], Emissions]
+) -> Iterator[HeldOut]:
+    for group in group_borders(len(streams)):
+        rest = [*streams[: group.start], *streams[group.stop :]]
+        sentences = sentences_per_place(rest, Selection())
+        places = list(sentences)
+        steps = np.sum([place_steps(stream, places) for stream in rest], axis=0)
+        frames = np.sum([[stream.places.count(place) for place in places] for stream in rest], axis=0)
+        models = emissions(make_training_set(sentences, vocabulary, steps=steps))
+        words = DictionaryModels(FIRST, models, frozenset(vocabulary))
+        for stream in streams[group]:
+            (part,) = evidence_in(stream, [words], selection=Selection(), per="frame", max_gap=None)
+            yield HeldOut(part, stream.table.places.codes(places), steps, shares_of(frames))

@@ -5,13 +5,17 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from helpers.point_clouds import clouds, steps_of
+from helpers.small_world import PLACES, VOCABULARY, run_through
 
-from placerec.hohmm import filter_stream, learned_transition
+from placerec.hohmm import Emissions, filter_stream, learned_transition
 from placerec.hohmm.weights import ALPHAS, MEMORIES, Weights
 from placerec.lm.logs import LN10
-from placerec.methods import evidence_weight
+from placerec.methods import evidence_weight, wu2009
 from placerec.methods.descriptors import DescriptorTrainingSet, PointStepFunction, through_filter
-from placerec.methods.evidence_weight import best_weights, without
+from placerec.methods.evidence_weight import best_weights, best_word_weights, without
+from placerec.methods.training_set import TrainingSet, make_training_set
+from placerec.model.evidence import group_borders
+from placerec.words import Selection, place_steps, sentences_per_place
 
 Likelihoods = Callable[[DescriptorTrainingSet], PointStepFunction]
 
@@ -78,3 +82,34 @@ def test_steps_are_counted_without_the_sequences_that_are_held_out() -> None:
     assert sorted(set(rest.sequences.tolist())) == [0, 2]
     np.testing.assert_array_equal(rest.steps, steps_of(rest.truth, rest.sequences))
     assert rest.steps.sum() == pytest.approx(58)
+
+
+def test_weights_of_words_are_those_of_the_method_that_learns_without_each_group() -> None:
+    streams = [run_through(f"run{i}", i) for i in range(6)]
+    learned: list[int] = []
+
+    def fit(training: TrainingSet) -> Emissions:
+        learned.append(int(training.counts.sum()))
+        return wu2009.fit(training)
+
+    found = best_word_weights(streams, VOCABULARY, fit)
+    assert sorted(learned) == [240, 300, 300, 300, 300]
+    judged = 0.0
+    for held in range(6):
+        group = next(part for part in group_borders(6) if part.start <= held < part.stop)
+        rest = [stream for i, stream in enumerate(streams) if not group.start <= i < group.stop]
+        sentences = sentences_per_place(rest, Selection())
+        emissions = wu2009.fit(make_training_set(sentences, VOCABULARY))
+        steps = np.sum([place_steps(stream, PLACES) for stream in rest], axis=0)
+        counts = np.sum([[stream.places.count(place) for place in PLACES] for stream in rest], axis=0)
+        shares = (counts + 1 / 3) / (counts.sum() + 1)
+        log10_p = found.alpha * emissions.score(streams[held].words)
+        belief = filter_stream(log10_p, learned_transition(steps, found.memory, shares)).belief
+        truth = streams[held].table.places.codes(PLACES)
+        judged -= float(np.log(belief[np.arange(60), truth]).sum())
+    assert found.frames == 360
+    assert found.log_loss == pytest.approx(judged / 360, rel=1e-5)
+
+
+def test_of_a_single_stream_nothing_is_chosen() -> None:
+    assert best_word_weights([run_through("run", 0)], VOCABULARY, wu2009.fit) == Weights(1.0, 0.0)

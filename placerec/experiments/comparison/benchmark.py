@@ -19,7 +19,8 @@ from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.frames import Sequence as FrameSequence, images_at
 from placerec.frames.sequence import Gray
 from placerec.frames.table import Labels
-from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder
+from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder, learned_transition
+from placerec.hohmm.weights import shares_of
 from placerec.lm.backoff import unite_models
 from placerec.methods import (
     HOHMM,
@@ -235,6 +236,20 @@ def _words(name: str, transition: str = "fixed") -> ComparedMethod:
     return ComparedMethod(lambda benchmark: _decoded(make_decoder(name, benchmark.models, options=options), benchmark))
 
 
+def _run_weighed(name: str, benchmark: Benchmark) -> MethodRun:
+    """A method of `placerec decode` that has a filter, whose evidence has a weight (`evidence_weight`)."""
+    emissions, streams = METHODS[name].emissions, benchmark.encoded.streams[: benchmark.training]
+    if emissions is None:
+        raise ValueError(f"{name} has no filter of ours")
+    found = evidence_weight.best_word_weights(streams, benchmark.encoded.dictionary.vocabulary, emissions)
+    decoder = make_decoder(
+        name, benchmark.models, options=Decoding(transition="learned", alpha=found.alpha, memory=0.0)
+    )
+    shares = shares_of(np.bincount(benchmark.points(PLAIN).truth, minlength=len(benchmark.places)))
+    transition = learned_transition(benchmark.points(PLAIN).steps, found.memory, shares)
+    return _decoded(decoder.changed(transition=transition), benchmark)
+
+
 def _run_order1(benchmark: Benchmark) -> MethodRun:
     """`hohmm` without the words before: the unigrams, smoothing and transitions of the models."""
     models = benchmark.models
@@ -342,6 +357,7 @@ COMPARED: dict[str, ComparedMethod] = {
     f"{HOHMM}-fixed": _words(HOHMM),
     f"{HOHMM}-order1": ComparedMethod(_run_order1),
     **{name: _words(name, "learned" if name == "mtd" else "fixed") for name in METHODS if name != HOHMM},
+    **{f"{name}@tuned": ComparedMethod(partial(_run_weighed, name)) for name, own in METHODS.items() if own.emissions},
     "pronobis2007": ComparedMethod(_run_cascade, TWO_WORDS),
     **_of_descriptors(PLAIN),
     **_of_descriptors(NORMALISED),
