@@ -15,7 +15,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import LanguageModelError
 from placerec.lm.counts import NgramCounts
-from placerec.lm.logs import EPSILON
+from placerec.lm.logs import EPSILON, shown
 
 
 @dataclass(frozen=True)
@@ -103,18 +103,20 @@ def modified_kneser_ney(d1: float, d2: float, d3: float) -> Discount:
     return shared
 
 
-def counts_of_counts(counts: NgramCounts, n: int, top: int, predictable: Mask, meta: Ints) -> Ints:
+def counts_of_counts(
+    counts: NgramCounts, n: int, top: int, predictable: Mask, meta: Ints, *, once: bool = False
+) -> Ints:
     """How many n-grams of order n occur 0, 1, ..., `top` times, int64 (top+1,).
 
     `predictable` bool (V,): words whose n-grams count when they come last. `meta` int64 (V,): k > 0 for a word that
-    stands for "n-grams that occur k times", as often as the count of that word says.
+    stands for "n-grams that occur k times", as often as the count of that word says (`once`: once).
     """
     trie = counts.trie
     word, count, seen = trie.word(n), counts.counts[n - 1], counts.seen[n - 1]
     plain = count[seen & predictable[word] & (count <= top)].astype(np.int64)
     tally = np.bincount(plain, minlength=top + 1)
     said = seen & (meta[word] > 0) & (meta[word] <= top)
-    np.add.at(tally, meta[word[said]], count[said].astype(np.int64))
+    np.add.at(tally, meta[word[said]], 1 if once else count[said].astype(np.int64))
     return tally
 
 
@@ -143,7 +145,7 @@ def good_turing_factors(tally: Ints, top: int) -> tuple[list[float] | None, list
             ratio = np.float64((k + 1) * tally[k + 1]) / np.float64(k * tally[k])
             factor = float((ratio - common) / (1 - common))
             if not np.isfinite(factor) or factor <= EPSILON or ratio > 1:
-                warnings.append(f"warning: discount coeff {k} is out of range: {factor:.6g}")
+                warnings.append(f"warning: discount coeff {k} is out of range: {shown(factor)}")
                 factor = 1.0
             factors.append(factor)
     return factors, warnings

@@ -10,7 +10,7 @@ from placerec.errors import LanguageModelError, refuse_string
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import Context, Rule
-from placerec.lm.logs import EPSILON, log10, p_of
+from placerec.lm.logs import EPSILON, log10, log10_of_sum, p_of
 from placerec.lm.mutable import SILENT, MutableModel, Trace, insert_prefixes, weigh_contexts
 from placerec.lm.smoothings import Smoothing
 from placerec.lm.trie import Trie, per_context, runs
@@ -54,7 +54,7 @@ def estimate_mutable(
     non_events: Iterable[str] = (),
     open_vocabulary: bool = False,
     unknown: str = UNKNOWN,
-    meta_tag: str | None = None,
+    meta: Ints | None = None,
     trust_totals: bool = False,
     alias_counts: Ints | None = None,
     trace: Trace = SILENT,
@@ -62,23 +62,25 @@ def estimate_mutable(
     """The model of `counts` by one rule per order, before missing prefixes are inserted.
 
     `unknown`: the word that stands for those outside the vocabulary.
-    `meta_tag`: words that start with it are counts of counts (section 4.5 of our SRILM specification).
+    `meta` int64 (V,): k for a word that stands for k occurrences, as often as its count says, 0 for one that stands for
+    some occurrences, -1 for other words (section 4.5 of our SRILM specification).
     `trust_totals`: a context's own count is its total. `alias_counts` int64 (V,): how many names each word has.
     """
     trie = counts.trie
-    meta = _MetaCounts.of(trie, meta_tag)
+    occurrences = np.full(len(trie.vocabulary), -1) if meta is None else meta
     silent = {*non_events, SENTENCE_START} | (set() if open_vocabulary else {unknown})
-    predictable = ~trie.vocabulary.mask(silent) & ~meta.word
+    predictable = ~trie.vocabulary.mask(silent) & (occurrences < 0)
     model = MutableModel(
         trie, predictable, np.ones(len(predictable), np.int64) if alias_counts is None else alias_counts
     )
-    # <s> is listed always, other non-events where the counts hold them; <unk> never while it is one.
-    listed = ~predictable & ~meta.word & counts.seen[0] & ~trie.vocabulary.mask([unknown])
+    # <s> is listed always, other non-events where the counts hold them (and words); <unk> never while it is one.
+    listed = ~predictable & ~(occurrences >= 0) & counts.seen[0] & ~trie.vocabulary.mask([unknown])
+    listed &= bool(counts.counts[0][predictable & counts.seen[0]].sum() > 0)
     model.stored[0] |= listed | trie.vocabulary.mask([SENTENCE_START])
     closed = _closed_contexts(trie, None if open_vocabulary else unknown)
     for n, rule in enumerate(rules, start=1):
         trace.discarded_contexts(n, int((closed[n - 1] & _seen(counts, n - 1)).sum()))
-        _estimate_order(model, counts, n, rule, closed[n - 1], meta, trust_totals, trace)
+        _estimate_order(model, counts, n, rule, closed[n - 1], occurrences, unknown, trust_totals, trace)
         trace.order_done(n)
         weigh_contexts(model, n, trace)
         model.refresh(n)
@@ -87,24 +89,6 @@ def estimate_mutable(
 
 # SRILM adds 1 to a context's count until 3 in a million is left: a million steps do for counts of 3e11.
 _MOST_STEPS = 1e6
-
-
-@dataclass(frozen=True)
-class _MetaCounts:
-    """Which words are meta counts (bool (V,)), and of how many occurrences each (0: the tag alone, an extra total)."""
-
-    word: Mask
-    occurrences: Ints
-
-    @staticmethod
-    def of(trie: Trie, tag: str | None) -> "_MetaCounts":
-        words = trie.vocabulary.words
-        word = np.array([tag is not None and w.startswith(tag) for w in words], bool)
-        occurrences = np.zeros(len(words), np.int64)
-        for number in np.flatnonzero(word).tolist():
-            digits = words[number].removeprefix(tag or "")
-            occurrences[number] = int(digits) if digits.isascii() and digits.isdigit() else 0
-        return _MetaCounts(word, occurrences)
 
 
 def _seen(counts: NgramCounts, n: int) -> Mask:
@@ -129,7 +113,8 @@ def _estimate_order(
     n: int,
     rule: Rule,
     closed: Mask,
-    meta: _MetaCounts,
+    meta: Ints,
+    unknown: str,
     trust_totals: bool,
     trace: Trace,
 ) -> None:
@@ -144,30 +129,33 @@ def _estimate_order(
         stats = Context(counts.counts[n - 2][contexts].astype(np.float64), stats.types, stats.types2, stats.types3)
     alive = stats.total[group] > 0
     count = counts.counts[n - 1][rows].astype(np.float64)
-    if n > 1:
-        alive &= (count != 0) & ~meta.word[word]
-        trace.discarded_ngrams(n, int((alive & ~model.predictable[word]).sum()), 0)
+    alive &= (meta[word] < 0) & ((count != 0) if n > 1 else True)
     kept = alive & model.predictable[word]
-    lower = _lower(model, n, rows[kept])
-    size = int(model.predictable.sum() + meta.word.sum())
-    _fill_order(model, _Order(n, rule, size, rows[kept], group[kept], count[kept], lower, contexts, stats), trace)
+    # Of single words only the unknown one is said to be discarded.
+    silent = alive & ~model.predictable[word] & (trie.vocabulary.mask([unknown])[word] if n == 1 else True)
+    silent_of = per_context(group[silent], len(contexts))
+    size = model.names + int((meta >= 0).sum())
+    order = _Order(
+        n, rule, size, rows[kept], group[kept], count[kept], _lower(model, n, rows[kept]), contexts, stats, silent_of
+    )
+    _fill_order(model, order, trace)
 
 
 def _lower(model: MutableModel, n: int, rows: Ints) -> Singles:
     """log10 p float32 (m,) of n-grams by the shorter context, the uniform one at the end."""
     if n == 1:
-        return np.full(len(rows), np.float32(-np.log10(max(1, int(model.predictable.sum())))), np.float32)
+        return np.full(len(rows), np.float32(-np.log10(max(1, model.names))), np.float32)
     model.refresh(n - 1)
     return model.backed_off(n - 1)[model.trie.suffixes[n - 1][rows]]
 
 
 def _statistics(
-    counts: NgramCounts, n: int, rows: Ints, group: Ints, size: int, predictable: Mask, meta: _MetaCounts, word: Ints
+    counts: NgramCounts, n: int, rows: Ints, group: Ints, size: int, predictable: Mask, meta: Ints, word: Ints
 ) -> Context:
     """Section 6.2, per context (size,): totals and types over the words that are events, and what meta counts add."""
     count = counts.counts[n - 1][rows].astype(np.float64)
-    times = meta.occurrences[word]
-    tag = meta.word[word] & (n > 1)
+    times = meta[word]
+    tag = (times >= 0) & (n > 1)
     total_tag, type_tag = tag & (times == 0), tag & (times > 0)
     return Context(
         total=per_context(group, size, np.where(type_tag, times * count, np.where(predictable | total_tag, count, 0))),
@@ -181,7 +169,8 @@ def _statistics(
 class _Order:
     """What order `n` is estimated from: n-grams `rows` (m,), their counts, their log10 p by the shorter context.
 
-    `contexts[group]` are their contexts, of which `stats` tells; `size` is V with the meta words.
+    `contexts[group]` are their contexts, of which `stats` tells; `size` is V with the meta words. `silent`: how many
+    n-grams of each context are left out, as their last word is never predicted.
     """
 
     n: int
@@ -193,6 +182,7 @@ class _Order:
     lower: Singles
     contexts: Ints
     stats: Context
+    silent: Floats
 
 
 def _fill_order(model: MutableModel, order: _Order, trace: Trace) -> None:
@@ -200,30 +190,58 @@ def _fill_order(model: MutableModel, order: _Order, trace: Trace) -> None:
     rule, n, group = order.rule, order.n, order.group
     interpolate = np.full(len(order.contexts), rule.interpolate and rule.discount is not None)
     total = order.stats.total
-    roomy = (order.stats.types < int(model.predictable.sum())) & rule.exhaustible & (rule.discount is not None)
+    roomy = (order.stats.types < model.names) & rule.exhaustible & (rule.discount is not None)
     p = np.zeros(len(order.rows))
+    log10_p = np.zeros(len(order.rows), np.float32)
     kept = np.zeros(len(order.rows), bool)
     todo = np.ones(len(order.contexts), bool)
     attempt = 0
     while todo.any():
         at = np.flatnonzero(todo[group])
-        p[at], kept[at] = _attempt(order, at, total, interpolate, attempt, trace)
+        trace.discarded_ngrams(n, int(order.silent[todo].sum()), 0)
+        p[at], log10_p[at], kept[at] = _attempt(order, at, total, interpolate, attempt, trace)
         used = at[kept[at]]
         spent = per_context(group[used], len(order.contexts), p[used])
         todo = todo & roomy & (spent > 1 - EPSILON)
         # A context that leaves nothing to unseen words is done again, first without interpolation, then thinner.
-        again = np.flatnonzero(todo)
-        interpolated = bool(interpolate[again].any())
-        trace.no_mass(n, attempt, order.contexts[again], 1 - spent[again], interpolated=interpolated)
-        total = np.where(todo & ~interpolate, total + 1, total)
+        again, used = np.flatnonzero(todo), used[todo[group[used]]]
+        place, interpolated = np.searchsorted(again, group[used]), bool(interpolate[again].any())
+        trace.no_mass(n, attempt, order.contexts[again], place, order.rows[used], p[used], interpolated=interpolated)
+        _check_reachable(n, total[todo], spent[todo])
+        if attempt < 2 or trace.every_attempt:
+            total = np.where(todo & ~interpolate, total + 1, total)
+        else:
+            total[again] = _least_total(order, again, total[again])
         interpolate = interpolate & ~todo
         attempt += 1
-        _check_reachable(n, total[todo], spent[todo])
     stored = order.rows[kept]
-    model.log10_p[n - 1][stored] = log10(p[kept])
+    model.log10_p[n - 1][stored] = log10_p[kept]
     model.stored[n - 1][stored] = True
     if n > 1:
         model.add_contexts(n - 1, runs(model.trie.prefix(n)[stored])[0])
+
+
+def _least_total(order: _Order, contexts: Ints, total: Floats) -> Floats:
+    """The totals (c,) of contexts, counted up from `total` in steps of 1, that leave something to unseen words."""
+    of = np.full(len(order.contexts), -1)
+    of[contexts] = np.arange(len(contexts))
+    at = np.flatnonzero(of[order.group] >= 0)
+    group, stats, count = of[order.group[at]], order.stats, order.count[at]
+
+    def enough(steps: Floats) -> Mask:
+        types = [column[contexts][group] for column in (stats.types, stats.types2, stats.types3)]
+        tried = Context((total + steps)[group], *types)
+        factor, _ = _discounted(order.rule, count, tried, order.size)
+        return per_context(group, len(contexts), factor * count / tried.total) <= 1 - EPSILON
+
+    low, high = np.zeros(len(contexts)), np.ones(len(contexts))
+    while (short := ~enough(high)).any():
+        low, high = np.where(short, high, low), np.where(short, 2 * high, high)
+    while (high - low > 1).any():
+        middle = np.floor((low + high) / 2)
+        fits = enough(middle)
+        low, high = np.where(fits, low, middle), np.where(fits, middle, high)
+    return total + high
 
 
 def _check_reachable(n: int, total: Floats, spent: Floats) -> None:
@@ -238,14 +256,15 @@ def _check_reachable(n: int, total: Floats, spent: Floats) -> None:
 
 def _attempt(
     order: _Order, at: Ints, total: Floats, interpolate: Mask, attempt: int, trace: Trace
-) -> tuple[Floats, Mask]:
-    """p of the n-grams `at` with these totals, and which of them are kept."""
+) -> tuple[Floats, Singles, Mask]:
+    """p of the n-grams `at` with these totals, log10 p, and which of them are kept."""
     group, count, lower, stats = order.group[at], order.count[at], order.lower[at], order.stats
     context = Context(total[group], stats.types[group], stats.types2[group], stats.types3[group])
     factor, weight = _discounted(order.rule, count, context, order.size)
     mixed = interpolate[group]
     part = factor * count / context.total
     p = np.where(mixed, part + weight * p_of(lower), part)
+    log10_p = log10_of_sum(p, [lower], [np.where(mixed, weight, 0)], start=part) if mixed.any() else log10(p)
     kept = factor != 0
     trace.probabilities(
         order.n,
@@ -255,10 +274,10 @@ def _attempt(
         context.total[kept],
         factor[kept],
         (weight[kept], lower[kept]) if mixed.any() else None,
-        log10(p[kept]),
+        log10_p[kept],
     )
     trace.discarded_ngrams(order.n, 0, int((~kept).sum()))
-    return p, kept
+    return p, log10_p, kept
 
 
 def _discounted(rule: Rule, count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:

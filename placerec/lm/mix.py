@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask, Singles
-from placerec.lm.logs import LN10, log10, p_of
+from placerec.lm.logs import LN10, log10, log10_of_sum, p_of
 from placerec.lm.mutable import SILENT, MutableModel, Trace, reweigh
 
 
@@ -21,10 +21,7 @@ def merge_weight(weights: Sequence[float], k: int) -> float:
 
 def merge(model: MutableModel, other: MutableModel, weight: float, trace: Trace = SILENT) -> None:
     """Section 11.4: mix `other`, over the same trie, into `model`, whose share is `weight`."""
-    mixed = [
-        log10(weight * p_of(model.backed_off(n)) + (1 - weight) * p_of(other.backed_off(n)))
-        for n in range(1, model.order + 1)
-    ]
+    mixed = [_mean([model.backed_off(n), other.backed_off(n)], [weight, 1 - weight]) for n in range(1, model.order + 1)]
     for n in range(model.order, 0, -1):
         new = np.flatnonzero(other.stored[n - 1] & ~model.stored[n - 1])
         model.stored[n - 1][new] = True
@@ -38,10 +35,14 @@ def merge(model: MutableModel, other: MutableModel, weight: float, trace: Trace 
 def mixed(log10_probs: Singles, weights: Floats) -> Singles:
     """log10 of the mean probability, float32 (T,); `weights` (K,), or (K, T) for each word, need not sum to 1."""
     weights = weights[:, None] if weights.ndim == 1 else weights
-    total = np.zeros(log10_probs.shape[1])
+    return _mean([*log10_probs], [*weights], _sum(weights))
+
+
+def _mean(log10_probs: Sequence[Singles], weights: Sequence[Floats | float], divisor: Floats | float = 1.0) -> Singles:
+    total = np.zeros(len(log10_probs[0]))
     for log10_p, weight in zip(log10_probs, weights, strict=True):
         total += weight * p_of(log10_p)
-    return log10(total / _sum(weights))
+    return log10_of_sum(total / divisor, log10_probs, weights, divisor=divisor)
 
 
 def posteriors(weights: Sequence[float], joints: Singles, scale: float) -> Floats:
@@ -50,6 +51,7 @@ def posteriors(weights: Sequence[float], joints: Singles, scale: float) -> Float
     Each weight is multiplied by 10^(scale * joint), and they sum to 1; where all vanish they are the plain ones.
     """
     plain = np.array(weights, np.float64)[:, None]
+    joints = joints if scale else np.zeros_like(joints)
     with np.errstate(invalid="ignore"):
         seen = plain * np.exp((scale * joints.astype(np.float64)).astype(np.float32).astype(np.float64) * LN10)
     seen = np.nan_to_num(seen)
@@ -81,6 +83,7 @@ class Cache:
 
     def __init__(self, ids: Ints, counted: Mask, size: int) -> None:
         places = np.flatnonzero(counted)
+        self.size, self.counted = size, counted
         self.stop: Ints = np.cumsum(counted) - counted
         self.start = np.maximum(0, self.stop - size)
         self.words = ids[places]
@@ -95,12 +98,13 @@ class Cache:
         shares: Floats = np.where(words >= 0, held, 0) / np.maximum(1, self.stop - self.start)
         return shares
 
-    def distribution(self, t: int, size: int) -> Floats:
-        """The share of each of `size` words in the cache at word `t`, float64 (size,)."""
-        recent = self.words[self.start[t] : self.stop[t]]
+    def distribution(self, t: int, size: int, *, after: bool = False) -> Floats:
+        """The share of each of `size` words in the cache at word `t`, or right after it, float64 (size,)."""
+        stop = int(self.stop[t] + (after and self.counted[t]))
+        recent = self.words[max(0, stop - self.size) : stop]
         return np.bincount(recent, minlength=size)[:size] / max(1, len(recent))
 
 
 def with_cache(log10_p: Singles, shares: Floats, weight: float) -> Singles:
     """log10 of (1 - weight) p + weight * share, float32 (T,); the share takes the way over its float32 logarithm."""
-    return log10((1 - weight) * p_of(log10_p) + weight * p_of(log10(shares)))
+    return _mean([log10_p, log10(shares)], [1 - weight, weight])

@@ -21,7 +21,9 @@ from placerec.lm.vocabulary import Vocabulary
 
 
 class Trace:
-    """A listener that hears nothing."""
+    """A listener that hears nothing. `every_attempt`: it wants to hear of each time that a context is done again."""
+
+    every_attempt = False
 
     def discarded_contexts(self, n: int, count: int) -> None:
         """`count` contexts of order n end in </s> or hold a closed <unk>."""
@@ -42,8 +44,13 @@ class Trace:
     ) -> None:
         """All that went into the n-grams `rows` (m,): `lower` is weight and log10 p of the shorter context, if used."""
 
-    def no_mass(self, n: int, attempt: int, contexts: Ints, mass: Floats, *, interpolated: bool) -> None:
-        """Contexts that leave nothing to unseen words: done again without interpolation, or with a larger total."""
+    def no_mass(
+        self, n: int, attempt: int, contexts: Ints, group: Ints, rows: Ints, p: Floats, *, interpolated: bool
+    ) -> None:
+        """Contexts that leave nothing to unseen words: done again without interpolation, or with a larger total.
+
+        `rows` (m,): n-grams of the contexts `contexts[group]`, with probability p.
+        """
 
     def order_done(self, n: int) -> None:
         """All probabilities of order n are there; the weights of its contexts come next."""
@@ -63,6 +70,9 @@ class Trace:
     def unigram_mass(self, mass: float, words: int, *, everyone: bool) -> None:
         """Mass that goes to the words without probability, or to everyone."""
 
+    def lacking(self, missing: Sequence[Ints], is_context: Sequence[Mask]) -> None:
+        """N-grams, rows per order, that will get a line because a longer context needs them."""
+
     def inserted(self, n: int, rows: Ints) -> None:
         """N-grams that got a line because a longer context needs them."""
 
@@ -74,6 +84,9 @@ class Trace:
         `context`: log10 of the joint probability of the context; `old`, `new`: log10 p with the n-gram and without;
         `entropy`: how far the model moves (relative entropy, base 10).
         """
+
+    def improbable(self, n: int, rows: Ints, log10_p: Singles, backed_off: Singles) -> None:
+        """N-grams of order n that are taken out, as they are less probable than by backing off."""
 
     def pruned(self, n: int, rows: Ints) -> None:
         """N-grams of order n taken out, perhaps none."""
@@ -116,6 +129,11 @@ class MutableModel:
     @property
     def order(self) -> int:
         return self.trie.order
+
+    @property
+    def names(self) -> int:
+        """How many names the words that get a probability have: SRILM takes each for a word where it counts words."""
+        return int(self.alias_counts[self.predictable].sum())
 
     def backed_off(self, n: int) -> Singles:
         """log10 p float32 (m_n,) of every row of order n; `refresh` first."""
@@ -210,9 +228,9 @@ def weigh_contexts(model: MutableModel, n: int, trace: Trace, *, minimum: float 
         left = 0.0 if abs(left) < EPSILON else left
         if left < 0:
             trace.overfull_contexts(1, np.zeros(1, np.int64), np.array([left]))
-            return
+        else:
+            spread_unigram_mass(model, left, trace)
         trace.weights(1, np.zeros(1, np.int64), np.array([left]), np.ones(1), log10(np.array([left])))
-        spread_unigram_mass(model, left, trace)
         return
     contexts = np.flatnonzero(model.is_context[n - 2])
     group = np.searchsorted(contexts, model.trie.prefix(n)[rows])
@@ -264,13 +282,14 @@ def spread_unigram_mass(model: MutableModel, mass: float, trace: Trace) -> None:
         # SRILM shares by names: a word with an alias takes one share and leaves the other.
         shares = int(model.alias_counts[zero].sum())
         trace.unigram_mass(mass, shares, everyone=False)
-        if mass > 0:
-            model.log10_p[0][zero] = np.float32(np.log10(mass / shares))
+        model.log10_p[0][zero] = log10(np.array([mass / shares]))
         return
-    size = int(model.predictable.sum())
     if mass > 0:
-        trace.unigram_mass(mass, size, everyone=True)
-    model.log10_p[0][model.predictable] = log10(p_of(model.log10_p[0][model.predictable]) + mass / max(1, size))
+        trace.unigram_mass(mass, model.names, everyone=True)
+    # To a word with several names its share is added as often.
+    for times in range(int(model.alias_counts.max(initial=0))):
+        named = model.predictable & (model.alias_counts > times)
+        model.log10_p[0][named] = log10(p_of(model.log10_p[0][named]) + mass / max(1, model.names))
 
 
 def insert_prefixes(model: MutableModel, trace: Trace) -> None:
@@ -283,6 +302,7 @@ def insert_prefixes(model: MutableModel, trace: Trace) -> None:
         lacking[needed[~model.stored[n - 1][needed]]] = True
         missing[n - 1] = np.flatnonzero(lacking)
         needed = np.unique(trie.prefix(n)[missing[n - 1]]) if n > 1 else needed
+    trace.lacking(missing, model.is_context)
     for n, rows in enumerate(missing, start=1):
         model.refresh(n)
         model.log10_p[n - 1][rows] = model.backed_off(n)[rows]

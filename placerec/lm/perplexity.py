@@ -46,7 +46,7 @@ def _perplexity(log10_p: float, predicted: float) -> float | None:
     if predicted <= 0:
         return None
     with np.errstate(over="ignore"):
-        return float(np.exp(np.float64(-(log10_p / predicted) * LN10)))
+        return float(np.exp(np.float64(log10_p / predicted) * -LN10))
 
 
 def tally_sentences(log10_p: Singles, unknown: Mask, scored: Mask, lengths: Ints, ended: Mask) -> Floats:
@@ -99,15 +99,21 @@ class Ranks(NamedTuple):
         )
 
 
-def rank_word(log10_p: float, everyone: Singles, *, known: bool, end: bool, weight: float = 1) -> Ranks:
-    """The ranks of one token among words of log10 p `everyone`; `known`: not unknown; `end`: a sentence end."""
+def rank_word(
+    log10_p: float, everyone: Singles, *, known: bool, end: bool, marker: bool = False, weight: float = 1
+) -> Ranks:
+    """The ranks of one token among words of log10 p `everyone`; `known`: not unknown; `end`: a sentence end.
+
+    `marker`: a </s>, perhaps within a sentence, which is counted among the words there, but not for its rank.
+    """
     p = math.exp(log10_p * LN10)
     place = rank(p, np.exp(everyone.astype(np.float64) * LN10))
     leading = tuple(weight * (place < top) for top in TOP_RANKS)
-    loss = 1 - p if p > 0 or known else 0.0
+    # What over-full models give too much of is no loss.
+    loss = (1 - p if not p > 1 else 0.0) if p > 0 or known else 0.0
     word = 0 if end else weight
     none = (0.0, 0.0, 0.0)
-    return Ranks(word, weight, none if end else leading, leading, weight * loss * loss, weight * loss)
+    return Ranks(word, weight, none if end or marker else leading, leading, weight * loss * loss, weight * loss)
 
 
 def rank(p: float, all_p: Floats) -> int:

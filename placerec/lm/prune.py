@@ -84,10 +84,12 @@ def _forget_contexts(model: MutableModel, n: int, contexts: Ints) -> None:
 def prune_improbable(model: MutableModel, *, shortest: int = 2, trace: Trace = SILENT) -> None:
     """Section 11.3: take out n-grams that are less probable than by backing off, until there are none.
 
-    Weights are recomputed after each round; contexts that lost their own line get it back at the end.
+    Weights are recomputed after each round, the last one, too; contexts that lost their line get it back at the end.
     """
     model.refresh_all()
-    while _improbable_round(model, shortest, trace):
+    removed = True
+    while removed:
+        removed = _improbable_round(model, shortest, trace)
         reweigh(model, trace)
     insert_prefixes(model, trace)
 
@@ -99,7 +101,9 @@ def _improbable_round(model: MutableModel, shortest: int, trace: Trace) -> bool:
         context = model.trie.prefix(n)[rows]
         with np.errstate(invalid="ignore"):
             backed_off = model.backed_off(n - 1)[model.trie.suffixes[n - 1][rows]] + model.backoff[n - 2][context]
-        gone = rows[backed_off > model.log10_p[n - 1][rows]]
+        less = backed_off > model.log10_p[n - 1][rows]
+        gone = rows[less]
+        trace.improbable(n, gone, model.log10_p[n - 1][gone], backed_off[less])
         model.stored[n - 1][gone] = False
         _forget_contexts(model, n, np.flatnonzero(model.is_context[n - 2]))
         model.refresh(n)

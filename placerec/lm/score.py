@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.arrays import Floats, Ints, Mask, Singles
-from placerec.lm.logs import p_of
+from placerec.arrays import Ints, Mask, Singles
 from placerec.lm.row_index import RowIndex
 
 # A row an n-gram or a word: float32 (m,), whose sums are SRILM's, or float64, (m,) or of C models (m, C).
@@ -26,8 +25,6 @@ Values = NDArray[Any]
 _MOST_CODES = 1 << 62
 # Words that are looked up together: the work space stays in cache, and memory does not grow with the text.
 CHUNK = 1 << 16
-# Words of a text that is drawn from a model, if its end is not drawn before.
-LONGEST = 50000
 
 
 class TokenSequence(NamedTuple):
@@ -364,42 +361,3 @@ def joint_log10_p(
         value = np.where(opening, as_end, np.where(np.isneginf(value) & silent[at - back], np.float32(0), value))
         total[at] += value
     return total
-
-
-# Text is drawn with NumPy's PCG64 (`numpy.random.PCG64(seed)`), one `Generator.random()` a word: the word drawn is the
-# first, in the order of the vocabulary, at which the cumulative probability exceeds that number times the sum. The same
-# model and seed give the same text everywhere.
-
-
-def draw_word(p: Floats, rng: "np.random.Generator") -> int:
-    """The number of a word drawn with probabilities `p` (V,), which need not sum to 1."""
-    cumulative = np.cumsum(p)
-    return min(int(np.searchsorted(cumulative, rng.random() * cumulative[-1], side="right")), len(p) - 1)
-
-
-def generate(
-    distribution: Callable[[Sequence[int]], Singles],
-    prefix: Sequence[int],
-    end: int,
-    rng: "np.random.Generator",
-    *,
-    order: int,
-    longest: int = LONGEST,
-) -> list[int]:
-    """Word numbers drawn one after the other behind `prefix` until `end` is drawn (it is left out).
-
-    `distribution` gives log10 p float32 (V,) of every word after a history of up to `order`-1 words, -inf for what
-    cannot be drawn. The sentence ends as well where nothing can be drawn, and after `longest` words.
-    """
-    words: list[int] = []
-    history = list(prefix)
-    while len(words) < longest:
-        p = p_of(distribution(history[max(0, len(history) - order + 1) :]))
-        if not p.sum() > 0:
-            break
-        word = draw_word(p, rng)
-        if word == end:
-            break
-        words.append(word)
-        history.append(word)
-    return words

@@ -108,9 +108,16 @@ def test_the_words_of_lines_that_are_too_long_are_not_listed(comment: bytes, tmp
 
 
 def test_the_largest_weights_are_whole_numbers() -> None:
-    _, out, _ = run(["-text-has-weights", "-order", "1", "-sort"], b"9223372036854775806 a\n1 a\n9007199254740993 b\n")
+    arguments = ["-text-has-weights", "-no-sos", "-no-eos", "-order", "1", "-sort"]
+    _, out, _ = run(arguments, b"9223372036854775806 a\n1 a\n9007199254740993 b\n")
     assert b"a\t9223372036854775807\n" in out
     assert b"b\t9007199254740993\n" in out
+
+
+def test_sums_beyond_the_largest_number_end_in_a_message() -> None:
+    status, out, err = run(["-text-has-weights", "-order", "1"], b"9223372036854775807 a\n1 a\n")
+    assert (status, out) == (1, b"")
+    assert b"a sum of counts is above 9223372036854775807, the most that can be counted" in err
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")

@@ -133,7 +133,8 @@ def test_sentences_are_prepared(run: Run) -> None:
     Path("n").write_text("b\n")
     assert total("-noise-vocab n", "a b\n") == total("", "a\n")
     assert total("-reverse", "b a\n") == total("", "a b\n")
-    assert total("-reverse", "<s> b a </s>\n") == total("", "a b\n")
+    # Lines are turned before markers are looked for.
+    assert total("-reverse", "<s> b a </s>\n") == total("", "</s> a b <s>\n")
     assert total("-tolower", "A B\n") == total("", "a b\n")
     assert total("-no-sos", "a\n").endswith("1 words, 0 OOVs\n0 zeroprobs, logprob= -1.80618 ")
     assert total("-no-eos", "a\n").startswith("file t: 0 sentences, 1 words")

@@ -15,10 +15,22 @@ def run(counts: str, *arguments: str) -> tuple[int, str, str]:
     return status, out.getvalue().decode(), err.getvalue().decode()
 
 
+def test_counts_beyond_the_largest_number_end_in_a_message() -> None:
+    for count in ("1" * 5000, str(2**63)):
+        assert run(f"a\t{count}\n", "-write", "-") == (
+            1,
+            "",
+            f"the count {count} is above {2**63 - 1}, the most that can be counted; divide the counts, or use"
+            " -float-counts\n",
+        )
+    status, out, err = run(f"a\t{2**63 - 1}\na\t{2**63 - 1}\na\t5\n", "-write", "-")
+    assert (status, out, err[:25]) == (1, "", "a sum of counts is above ")
+    assert run(f"a\t{2**62}\na\t{2**62 - 1}\nb\t{2**63 - 1}\n")[1] == f"a\t{2**63 - 1}\nb\t{2**63 - 1}\n"
+
+
 def test_counts_end_at_the_largest_number() -> None:
     largest = 2**63 - 1
-    assert run("a\t" + "1" * 5000 + "\n", "-write", "-")[1] == f"a\t{largest}\n"
-    _, out, _ = run(f"a b\t{10**30}\n", "-recompute", "-sort", "-write", "-")
+    _, out, _ = run(f"a b\t{largest}\n", "-recompute", "-sort", "-write", "-")
     assert out == f"a\t{2**63 - 1024}\na b\t{largest}\n"
 
 

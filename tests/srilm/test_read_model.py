@@ -14,7 +14,7 @@ from placerec.lm.mutable import MutableModel
 from placerec.srilm.model import arpa_reader
 from placerec.srilm.model.arpa import read_model
 from placerec.srilm.model.arpa_reader import log_value
-from placerec.srilm.order.messages import ContextTimes, message_order
+from placerec.srilm.order.contexts import ContextTimes, message_order
 from placerec.srilm.text.streams import SrilmError, Streams
 from placerec.srilm.text.vocabulary import WordList
 from placerec.srilm.tools.ngram import ngram
@@ -295,7 +295,7 @@ def test_contexts_are_told_of_in_the_order_of_the_hash_tables(
     table = Table(4)
     for context in ordered:
         table.insert([word + 4 for word in reversed(context)])
-    order = message_order(mutable.trie, times)
+    order = message_order(mutable.trie, lambda: times)
     for n in (1, 2):
         rows = np.flatnonzero(mutable.is_context[n - 1])
         walked = rows[np.argsort(order(n + 1, rows))]

@@ -94,6 +94,13 @@ def test_the_sorted_vocabulary_knows_the_numbers() -> None:
 
 def test_meta_words() -> None:
     words = WordList(meta_tag="__meta__")
-    assert words.is_meta("__meta__2")
-    assert not words.is_meta("meta")
-    assert not WordList().is_meta("__meta__2")
+    asked = ("__meta__2", "__meta__", "__meta__07x", "__meta__x", "meta")
+    assert [words.occurrences(word) for word in asked] == [2, 0, 7, -1, -1]
+    assert WordList().occurrences("__meta__2") == -1
+
+
+def test_meta_words_are_words_of_a_closed_vocabulary() -> None:
+    words = WordList(meta_tag="@@")
+    words.closed = True
+    assert words.number("@@3") == words.index["@@3"]
+    assert words.number("@@x") == words.index["<unk>"]

@@ -10,7 +10,7 @@ from placerec.lm.score import ScoreTables
 from placerec.lm.trie import closed_trie
 from placerec.srilm.model.arpa_lines import Block
 from placerec.srilm.model.arpa_reader import Reader
-from placerec.srilm.order.messages import NEVER, ContextTimes
+from placerec.srilm.order.contexts import NEVER, ContextTimes
 from placerec.srilm.text.streams import Streams
 from placerec.srilm.text.vocabulary import WordList
 

@@ -301,7 +301,8 @@ def _next_headline(data: bytes, start: int) -> int:
 def log_value(text: str) -> float | None:
     """A log10 number as SRILM reads it: -inf for -99; None if there is no number."""
     if _DECIMAL.fullmatch(text):
-        value: float | None = float(text) if any(c.isdigit() for c in text) else 0.0
+        nothing = -0.0 if text.startswith("-") else 0.0
+        value: float | None = float(text) if any(c.isdigit() for c in text) else nothing
     else:
         value = leading_float(text)
     return -np.inf if value is not None and np.float32(value) == LOG_ZERO else value

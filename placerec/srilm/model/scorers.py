@@ -12,7 +12,6 @@ import numpy as np
 
 from placerec.arrays import Ints, Mask, Singles
 from placerec.lm.score import Contexts, ScoreTables, TokenSequence, joint_log10_p
-from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.text.vocabulary import WordList
 
 Tag = Callable[[int], str]
@@ -69,10 +68,10 @@ class Null:
 class Model:
     """A back-off model, whose tables are made when they are first needed; its word numbers are those of `words`.
 
-    `skipping`: probability 0 for unknown words and the two words behind them (-skipoovs).
+    `skipping`: probability 0 for unknown words and so many words behind them (-skipoovs); None: as the model says.
     """
 
-    def __init__(self, make_tables: Callable[[], ScoreTables], words: WordList, *, skipping: bool = False) -> None:
+    def __init__(self, make_tables: Callable[[], ScoreTables], words: WordList, skipping: int | None = None) -> None:
         self._make_tables, self.words, self.skipping = make_tables, words, skipping
 
     @cached_property
@@ -95,10 +94,10 @@ class ModelView:
 
     @cached_property
     def near(self) -> Mask:
-        """The words within two behind an unknown one, bool (T,)."""
+        """The words that are skipped because of an unknown one before them, bool (T,)."""
         near = np.zeros(len(self.digits), bool)
         place, unknown = self.sequence.place, self.sequence.ids == self.unknown
-        for back in (1, 2):
+        for back in range(1, (self.model.skipping or 0) + 1):
             near[back:] |= unknown[:-back] & (place[back:] >= back)
         return near
 
@@ -106,7 +105,7 @@ class ModelView:
         """The probabilities of the sequence's words, or of others in their places."""
         digits = self.digits if words is None else self.tables.digits(words)
         log10_p, answered = self.tables.find(self.contexts, digits)
-        if not self.model.skipping:
+        if self.model.skipping is None:
             return Scored(log10_p, lambda t: self.tags[answered[t]])
         skipped = self.near | ((self.sequence.ids if words is None else words) == self.unknown)
         log10_p[skipped] = -np.inf
@@ -117,12 +116,11 @@ class ModelView:
         log10_p, later = self.tables.distribution(self.contexts, t), len(self.model.words.words) - self.tables.V
         if later:
             log10_p = np.append(log10_p, np.full(later, -np.inf, np.float32))
-        if self.model.skipping:
+        if self.model.skipping is not None:
             log10_p[slice(None) if self.near[t] else self.unknown] = -np.inf
         return log10_p
 
     def joint(self, length: int) -> Singles:
         """log10 of the joint probability of the last `length` words before each word, float32 (T,)."""
-        index, silent = self.model.words.index, ~event_mask(self.model.words)[self.sequence.ids]
-        start, end = index.get(SENTENCE_START, -1), index.get(SENTENCE_END, -1)
-        return joint_log10_p(self.tables, self.sequence, length, silent, start=start, end=end)
+        words, silent = self.model.words, ~event_mask(self.model.words)[self.sequence.ids]
+        return joint_log10_p(self.tables, self.sequence, length, silent, start=words.start, end=words.end)

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from placerec.arrays import Floats, Ints, Singles
+from placerec.arrays import Ints
 from placerec.lm.counts import NgramCounts, occurrences
 from placerec.lm.stored_text import StoredText
 from placerec.lm.trie import Trie, runs
+from placerec.srilm.order.contexts import NEVER, ContextTimes, context_ranks
 from placerec.srilm.order.hashing import walk_order
-from placerec.srilm.order.messages import NEVER, ContextTimes, Messages, context_ranks
+from placerec.srilm.order.messages import Messages
 from placerec.srilm.text.counts_file import Table
 from placerec.srilm.text.vocabulary import WordList
 
@@ -69,8 +70,11 @@ class FirstSeen:
 class EstimationMessages(Messages):
     """Messages in the order of SRILM's hash tables: the n-grams' in the count trie, the contexts' in the model."""
 
+    empty_weight = 0.0
+
     def __init__(self, counts: NgramCounts, first: FirstSeen, *args: Any, **options: Any) -> None:
-        super().__init__(counts.trie, *args, visited=self._visited, weighed=self._weighed, **options)
+        numbers = first.words.numbers(counts.trie.vocabulary)
+        super().__init__(counts.trie, *args, numbers=numbers, visited=self._visited, weighed=self._weighed, **options)
         self.counts = counts
         self.first = first
         # N-grams of order n as they were stored, for n = 2, 3, ...: they make their contexts.
@@ -80,10 +84,6 @@ class EstimationMessages(Messages):
         if n > 1:
             self._stored.setdefault(n, []).append(rows)
         super().probabilities(n, attempt, rows, *details)
-
-    def weights(self, n: int, contexts: Ints, num: Floats, den: Floats, weight: Singles) -> None:
-        # The golden runs show 0 for the empty context while estimating, and log10 of its mass when pruning.
-        super().weights(n, contexts, num, den, weight if n > 1 else np.zeros_like(weight))
 
     @cached_property
     def _walk(self) -> list[Ints]:
@@ -102,14 +102,13 @@ class EstimationMessages(Messages):
         """Places of contexts in the model, whose tables are nested from the most recent word to the oldest."""
         if n == 1:
             return contexts
-        words = self.first.words
-        times = ContextTimes(self.trie, self._born(n), words.numbers(self.trie.vocabulary), len(words.index))
+        times = ContextTimes(self.trie, self._born(), self.numbers, len(self.first.words.index))
         return context_ranks(times)[n - 2][contexts]
 
-    def _born(self, n: int) -> list[Ints]:
-        """Per order below n, when each row became a context of the model, int64 (m_k,)."""
-        born = [np.full(len(keys), NEVER) for keys in self.trie.keys[: n - 1]]
-        for k in range(2, n + 1):
+    def _born(self) -> list[Ints]:
+        """Per order, when each row became a context of the model, int64 (m_k,), NEVER if it has not by now."""
+        born = [np.full(len(keys), NEVER) for keys in self.trie.keys]
+        for k in range(2, self.trie.order + 1):
             rows = np.concatenate([runs(self.trie.prefix(k)[its])[0] for its in self._stored.get(k, [_NO_ROWS])])
             stamp = k * _LONG + self._walk[k - 2][rows]
             for j in range(k - 1, 0, -1):

@@ -50,6 +50,17 @@ def table_order(table: Ints, keys: NDArray[np.uint64], *, size_hint: int = 0) ->
     return order
 
 
+def name_order(names: Sequence[str]) -> Ints:
+    """The places int64 (N,) of names (Latin-1), put in one after the other, in the order of SRILM's vocabulary."""
+    keys = []
+    for name in names:
+        key = 0
+        for byte in name.encode("latin-1"):
+            key = (9 * key + (byte if byte < 128 else byte - 256)) % 2**64
+        keys.append(key)
+    return table_order(np.zeros(len(keys), np.int64), np.array(keys, np.uint64))
+
+
 def _entries_at_most(capacity: int) -> int:
     """How many entries a table of this capacity takes before it grows."""
     entries = int(capacity * 0.8) + 2

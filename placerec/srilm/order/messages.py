@@ -1,31 +1,30 @@
 """SRILM's messages about estimating and changing models: sections 6 and 11 of our SRILM specification."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Mask, Singles
-from placerec.lm.logs import LN10
+from placerec.lm.logs import LN10, shown
 from placerec.lm.mutable import Trace
-from placerec.lm.trie import Trie
-from placerec.srilm.order.hashing import table_order
+from placerec.lm.trie import Trie, per_context
+from placerec.srilm.order.contexts import ContextOrder, noted_order
 from placerec.srilm.text.streams import Streams
-
-NEVER = np.iinfo(np.int64).max
-# The place of each of some rows, int64, in the order in which SRILM comes by: (order, rows) -> places.
-ContextOrder = Callable[[int, Ints], Ints]
 
 
 class Messages(Trace):
     """Says on stderr what SRILM says at `debug`; contexts are shown with their most recent word first.
 
-    `visited` gives the order in which estimation visits n-grams, `weighed` that in which weights are computed (for
-    the contexts of order n, rows of order n-1); by default that of the rows. `announced`: said at debug 1 before an
+    `numbers` int64 (V,): SRILM's number of each word. `visited` gives the order in which estimation visits n-grams,
+    `weighed` that in which weights are computed (for the contexts of order n, rows of order n-1); by default that of
+    the rows. `announced`: said at debug 1 before an
     order is estimated.
     """
+
+    # What stands in the empty context of a model that was read.
+    empty_weight = -np.inf
 
     def __init__(
         self,
@@ -33,6 +32,7 @@ class Messages(Trace):
         streams: Streams,
         debug: int,
         *,
+        numbers: Ints,
         visited: ContextOrder | None = None,
         weighed: ContextOrder | None = None,
         announced: Mapping[int, str] | None = None,
@@ -40,10 +40,13 @@ class Messages(Trace):
         self.trie = trie
         self.streams = streams
         self.debug = debug
+        self.numbers = numbers
+        self.every_attempt = debug >= 1
         self.visited = visited or (lambda n, rows: rows)
         self.weighed = weighed or (lambda n, contexts: contexts)
         self.announced = announced or {}
         self._waiting: list[tuple[int, Ints, list[str], ContextOrder, int, Ints | None]] = []
+        self._noted: list[Ints] = []
         self._closing: list[str] = []
         self._lost = np.zeros(2, np.int64)
 
@@ -72,7 +75,8 @@ class Messages(Trace):
         """
         values = zip(*(column.tolist() for column in columns), strict=True) if columns else [()] * len(contexts)
         lines = [
-            text.format(self.shown(n - 1, row), *more) for row, more in zip(contexts.tolist(), values, strict=True)
+            text.format(self.shown(n - 1, row), *(shown(one) if isinstance(one, float) else one for one in more))
+            for row, more in zip(contexts.tolist(), values, strict=True)
         ]
         if lines:
             self._waiting.append((n, contexts, lines, order, attempt, rows))
@@ -129,16 +133,21 @@ class Messages(Trace):
         if self.debug < 4:
             return
         contexts = self.trie.prefix(n)[rows] if n > 1 else np.zeros(len(rows), np.int64)
-        text = "CONTEXT {} WORD {} NUMER {:g} DENOM {:g} DISCOUNT {:g} "
-        text += "LPROB {:g}" if lower is None else "LOW {:g} LOLPROB {:g} LPROB {:g}"
+        text = "CONTEXT {} WORD {} NUMER {} DENOM {} DISCOUNT {} "
+        text += "LPROB {}" if lower is None else "LOW {} LOLPROB {} LPROB {}"
         columns = self._last_words(n, rows), count, total, factor, *(lower or ()), log10_p
         self._say_of(n, contexts, text, self.estimated, *columns, attempt=2 * attempt, rows=rows)
 
-    def no_mass(self, n: int, attempt: int, contexts: Ints, mass: Floats, *, interpolated: bool) -> None:
-        if self.debug < 1:
+    def no_mass(
+        self, n: int, attempt: int, contexts: Ints, group: Ints, rows: Ints, p: Floats, *, interpolated: bool
+    ) -> None:
+        if self.debug < 1 or not len(contexts):
             return
+        # What is left is next to nothing: it depends on the order in which SRILM sums.
+        order = np.argsort(self.visited(n, rows), kind="stable")
+        mass = 1 - per_context(group[order], len(contexts), p[order])
         remedy = "disabling interpolation" if interpolated else "incrementing denominator"
-        text = f'warning: {{1:g}} backoff probability mass left for "{{0}}" -- {remedy}'
+        text = f'warning: {{1}} backoff probability mass left for "{{0}}" -- {remedy}'
         self._say_of(n, contexts, text, self.estimated, mass, attempt=2 * attempt + 1)
 
     def full_contexts(self, n: int, contexts: Ints) -> None:
@@ -146,27 +155,33 @@ class Messages(Trace):
         self._say_of(n, contexts, text, self.weighed)
 
     def overfull_contexts(self, n: int, contexts: Ints, mass: Floats) -> None:
-        self._say_of(n, contexts, 'BOW numerator for context "{}" is {:g} < 0', self.weighed, mass)
+        self._say_of(n, contexts, 'BOW numerator for context "{}" is {} < 0', self.weighed, mass)
 
     def scarce_contexts(self, n: int, contexts: Ints, mass: Floats, minimum: float) -> None:
-        text = f'insufficient backoff mass {{1:g}} for context "{{0}}"; scaling probabilities to mass {1 - minimum:g}'
+        text = f'insufficient backoff mass {{1}} for context "{{0}}"; scaling probabilities to mass {1 - minimum:g}'
         self._say_of(n, contexts, text, self.weighed, mass)
 
     def weights(self, n: int, contexts: Ints, num: Floats, den: Floats, weight: Singles) -> None:
+        if n == 1:
+            # SRILM computes no weight for the empty context: the message tells what stands there.
+            weight = np.full(1, self.empty_weight, np.float32)
         if self.debug >= 4:
-            text = "CONTEXT {} numerator {:g} denominator {:g} BOW {:g}"
+            text = "CONTEXT {} numerator {} denominator {} BOW {}"
             self._say_of(n, contexts, text, self.weighed, num, den, weight, attempt=1)
         self._flush()
 
     def unigram_mass(self, mass: float, words: int, *, everyone: bool) -> None:
-        self._flush()
         if self.debug >= 1:
             to = f"over all {words} words" if everyone else f"over {words} zeroton words"
-            self.streams.say(f"warning: distributing {mass:g} left-over probability mass {to}")
+            self.streams.say(f"warning: distributing {shown(mass)} left-over probability mass {to}")
+
+    def lacking(self, missing: Sequence[Ints], is_context: Sequence[Mask]) -> None:
+        if self.debug >= 3:
+            self._noted = noted_order(self.trie, missing, is_context, self.weighed, self.numbers)
 
     def inserted(self, n: int, rows: Ints) -> None:
         if self.debug >= 3:
-            for row in rows.tolist():
+            for row in self._noted[n - 1].tolist():
                 self.streams.say(f"faking probability for context {self.shown(n, row)}")
         if self.debug >= 1:
             self.streams.say(f"inserted {len(rows)} redundant {n}-gram probs")
@@ -176,81 +191,18 @@ class Messages(Trace):
     ) -> None:
         if self.debug < 4:
             return
-        text = "CONTEXT {} WORD {} CONTEXTPROB {:g} OLDPROB {:g} NEWPROB {:g} DELTA-H {:g} DELTA-LOGP {:g}"
-        text += " PPL-CHANGE {:g} PRUNED {:d}"
+        text = "CONTEXT {} WORD {} CONTEXTPROB {} OLDPROB {} NEWPROB {} DELTA-H {} DELTA-LOGP {}"
+        text += " PPL-CHANGE {} PRUNED {:d}"
         columns = self._last_words(n, rows), context, old, new, entropy, new - old, np.exp(entropy * LN10) - 1, gone
         self._say_of(n, self.trie.prefix(n)[rows], text, self.weighed, *columns, attempt=1)
+
+    def improbable(self, n: int, rows: Ints, log10_p: Singles, backed_off: Singles) -> None:
+        if self.debug >= 4:
+            text = "CONTEXT {} WORD {} LPROB {} BACKOFF-LPROB {} PRUNED"
+            columns = self._last_words(n, rows), log10_p, backed_off
+            self._say_of(n, self.trie.prefix(n)[rows], text, self.weighed, *columns)
 
     def pruned(self, n: int, rows: Ints) -> None:
         self._flush()
         if self.debug >= 1 and len(rows):
             self.streams.say(f"pruned {len(rows)} {n}-grams")
-
-
-@dataclass(frozen=True)
-class ContextTimes:
-    """When each context was put into the trie: `created` int64 (m_n,) per order beside the rows, NEVER if it was not.
-
-    `numbers` int64 (V,): SRILM's number of each word. `expected`: the size of vocabulary that the model was made for.
-    """
-
-    trie: Trie
-    created: Sequence[Ints] = field(repr=False)
-    numbers: Ints = field(repr=False)
-    expected: int = 0
-
-
-def message_order(trie: Trie, times: ContextTimes) -> ContextOrder:
-    """Gives the places of contexts of a model over `trie` in SRILM's walk; `times`: when contexts were read.
-
-    Contexts that were not read come last, in the order of their words.
-    """
-    ranks: list[Ints] = []
-
-    def places(n: int, contexts: Ints) -> Ints:
-        if n == 1:
-            return contexts
-        if not ranks:
-            ranks.extend(context_ranks(times))
-        row = _same_rows(trie, times.trie, n - 1, contexts)
-        known = ranks[n - 2][row] if n - 1 <= len(ranks) and len(ranks[n - 2]) else np.full(len(row), NEVER)
-        known = np.where(row >= 0, known, NEVER)
-        late = np.flatnonzero(known == NEVER)
-        if len(late):
-            *_, last = (rank for _, rank in zip(range(n - 1), trie.context_ranks(), strict=False))
-            known[late] = NEVER // 2 + last[contexts[late]]
-        return known
-
-    return places
-
-
-def _same_rows(trie: Trie, other: Trie, n: int, rows: Ints) -> Ints:
-    """The rows of `other` that hold the words of `rows` of order n of `trie`, -1 where there are none."""
-    numbers = np.empty((len(rows), n), np.int64)
-    for k in range(n, 0, -1):
-        numbers[:, k - 1] = trie.word(k)[rows]
-        rows = trie.prefix(k)[rows] if k > 1 else rows
-    own = other.vocabulary.ids(trie.vocabulary.words)[numbers]
-    found = own[:, 0]
-    for k in range(2, n + 1):
-        found = other.find(k, found, own[:, k - 1])
-    return found
-
-
-def context_ranks(times: ContextTimes) -> list[Ints]:
-    """Per length of context, the place of each row in SRILM's walk, int64 (m_n,); NEVER for what is no context."""
-    trie = times.trie
-    ranks: list[Ints] = []
-    oldest, above = trie.keys[0], np.zeros(len(trie.vocabulary), np.int64)
-    for k, created in enumerate(times.created[: trie.order - 1], start=1):
-        if k > 1:
-            oldest, above = oldest[trie.prefix(k)], ranks[-1][trie.suffixes[k - 1]]
-        rows = np.flatnonzero(created < NEVER)
-        rows = rows[np.lexsort((created[rows], above[rows]))]
-        table: Ints = np.cumsum(np.diff(above[rows], prepend=above[rows][:1]) > 0)
-        keys = times.numbers[oldest[rows]].astype(np.uint64)
-        walked = rows[table_order(table, keys, size_hint=times.expected if k == 1 else 0)]
-        rank = np.full(len(trie.keys[k - 1]), NEVER)
-        rank[walked] = np.arange(len(walked))
-        ranks.append(rank)
-    return ranks

@@ -1,31 +1,42 @@
 """Counts files: section 4.2 of our SRILM specification."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from placerec.srilm.text.numbers import bounded_int, leading_float
-from placerec.srilm.text.streams import Lines, Streams, tokens
+from placerec.srilm.text.streams import Lines, SrilmError, Streams, tokens
 
 if TYPE_CHECKING:
     from placerec.lm.counts import NgramCounts
     from placerec.srilm.text.vocabulary import WordList
 
 MOST_TOKENS = 100
+TOO_MANY = f"{{}} is above {2**63 - 1}, the most that can be counted; divide the counts, or use -float-counts"
 MALFORMED = "malformed N-gram count or more than 100 words per line"
 
 
-def parse_count(text: str, fractional: bool, *, most: int = 2**63 - 1) -> float | None:
-    """The count at the start of a text, as C's scanf reads it (%lu or %lf); None if there is none."""
+# SRILM's integers end at 2^64 - 1, numpy's here.
+MOST = 2**63 - 1
+
+
+def parse_count(text: str, fractional: bool, *, most: int | None = None) -> float | None:
+    """The count at the start of a text, as C's scanf reads it (%lu or %lf), `most` if it is greater.
+
+    None if there is none. Without `most`, SrilmError for a count above MOST.
+    """
     if fractional:
         return leading_float(text)
     match = re.match(r"\+?([0-9]+)", text)
-    # SRILM's integers end at 2^64 - 1, numpy's at 2^63 - 1.
-    return bounded_int(match[1], most=most) if match else None
+    count = bounded_int(match[1], most=2**64 if most is None else most) if match else None
+    if count is not None and most is None and count > MOST:
+        raise SrilmError(TOO_MANY.format(f"the count {text}"))
+    return count
 
 
-def split_count(line: str, fractional: bool, *, most: int = 2**63 - 1) -> tuple[list[str], float | None]:
+def split_count(line: str, fractional: bool, *, most: int | None = None) -> tuple[list[str], float | None]:
     """The words of an n-gram and the count behind them; None for the count of a malformed line."""
     *ngram, text = tokens(line)
     return ngram, parse_count(text, fractional, most=most) if 0 < len(ngram) < MOST_TOKENS else None
@@ -53,28 +64,6 @@ class Table:
         kept = [i for i, ngram in enumerate(self.ngrams) if tuple(ngram) in held]
         return Table([self.ngrams[i] for i in kept], [self.counts[i] for i in kept])
 
-    def at_least(self, minima: Sequence[float], words: "WordList") -> "Table":
-        """The n-grams seen as often as the minimum of their order; the others become counts of counts per prefix.
-
-        That is what -read-with-mincounts does, with a meta tag; without one they are left out.
-        """
-        table = Table()
-        dropped: dict[tuple[int, ...], dict[int, int]] = {}
-        kept: set[tuple[int, ...]] = set()
-        for ngram, count in zip(self.ngrams, self.counts, strict=True):
-            if count < int(minima[min(len(ngram), len(minima)) - 1]):
-                tally = dropped.setdefault(tuple(ngram[:-1]), {})
-                tally[int(count)] = tally.get(int(count), 0) + 1
-            else:
-                table.add(ngram, count)
-                kept.add(tuple(ngram[:-1]))
-        if words.meta_tag is not None:
-            for prefix, tally in dropped.items():
-                if prefix in kept:
-                    for count, times in sorted(tally.items()):
-                        table.add([*prefix, words.add(f"{words.meta_tag}{count}")], times)
-        return table
-
     def count(self, order: int, words: "WordList", *, fractional: bool) -> "NgramCounts":
         """The counts of the n-grams up to `order` over the sorted vocabulary; repeated n-grams add up."""
         # Not needed by ngram-merge, which starts much sooner without.
@@ -94,7 +83,7 @@ class Table:
 
 
 def count_lines(
-    name: str, fractional: bool, streams: Streams, *, most: int = 2**63 - 1
+    name: str, fractional: bool, streams: Streams, *, most: int | None = None
 ) -> Iterator[tuple[list[str], float]]:
     """The n-grams of a counts file and their counts, at most `most`; a malformed line is reported and ends the file."""
     lines = streams.lines(name)
@@ -102,7 +91,7 @@ def count_lines(
 
 
 def counted(
-    lines: Lines, rest: Iterable[str], fractional: bool, *, most: int = 2**63 - 1
+    lines: Lines, rest: Iterable[str], fractional: bool, *, most: int | None = None
 ) -> Iterator[tuple[list[str], float]]:
     """What `count_lines` has of a file, from the lines that are left of one."""
     for line in rest:
@@ -114,19 +103,52 @@ def counted(
 
 
 def read_counts(
-    name: str, order: int, words: "WordList", streams: Streams, *, fractional: bool, limited: bool = False
+    name: str,
+    order: int,
+    words: "WordList",
+    streams: Streams,
+    *,
+    fractional: bool,
+    limited: bool = False,
+    minima: Sequence[float] | None = None,
 ) -> Table:
-    """The n-grams up to `order` of a counts file; with `limited`, those with a word that is not listed are left out."""
-    return tabled(count_lines(name, fractional, streams), order, words, limited=limited)
+    """The n-grams up to `order` of a counts file, those of `tabled`."""
+    return tabled(count_lines(name, fractional, streams), order, words, limited=limited, minima=minima)
 
 
-def tabled(counts: Iterable[tuple[list[str], float]], order: int, words: "WordList", *, limited: bool = False) -> Table:
-    """The table of n-grams up to `order` and their counts; `limited`: without words that are not listed."""
+def tabled(
+    counts: Iterable[tuple[list[str], float]],
+    order: int,
+    words: "WordList",
+    *,
+    limited: bool = False,
+    minima: Sequence[float] | None = None,
+) -> Table:
+    """The table of n-grams up to `order` and their counts.
+
+    `limited`: those with a word that is not listed are left out. `minima`: so are, instead, those seen more rarely than
+    the minimum of their order, the last one repeats (-read-with-mincounts); with a meta tag, the counts of counts of
+    what is left out after each prefix that is kept come last.
+    """
     table = Table()
+    dropped: dict[tuple[str, ...], Counter[int]] = {}
     for ngram, count in counts:
         if len(ngram) > order:
             continue
-        if limited and any(words.normal(word) not in words.index for word in ngram):
+        if minima is not None:
+            if count < minima[min(len(ngram), len(minima)) - 1]:
+                dropped.setdefault(tuple(ngram[:-1]), Counter())[int(count)] += 1
+                continue
+        elif limited and any(
+            words.normal(word) not in words.index and words.occurrences(words.normal(word)) < 0 for word in ngram
+        ):
             continue
         table.add([words.number(word) for word in ngram], count)
+    if words.meta_tag is not None:
+        kept = {tuple(ngram[:-1]) for ngram in table.ngrams}
+        for prefix, tally in dropped.items():
+            numbers = [words.known(word) for word in prefix]
+            if tuple(numbers) in kept:
+                for k, times in sorted(tally.items()):
+                    table.add([*numbers, words.add(f"{words.meta_tag}{k}")], times)
     return table

@@ -12,7 +12,7 @@ import numpy as np
 
 from placerec.ahead import make_ahead
 from placerec.arrays import Ints, Mask
-from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, add_markers, find_markers
+from placerec.lm.vocabulary import add_markers, find_markers
 from placerec.srilm.text.fields import Fields, NameTable, comments, split_lines, usual_blocks, without_lines
 from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import Lines, tokens
@@ -31,9 +31,9 @@ class Handling(NamedTuple):
     """What is done to sentences: which markers are put around them, words that are left out, and more.
 
     `adding`: words that are not listed are added to the word list; otherwise they are the unknown word. `weight`: where
-    a line's weight stands (`first`, `last`, or nowhere), which `parse_weight` reads, giving None for what is none;
-    `too_long`: what is said of a line of more than LONGEST words, which is left out. `escape`: the start of lines that
-    are copied; `verbose`: keep the lines' words as they are; `noise`: numbers of words that are left out.
+    a line's weight stands (`first`, `last`, or nowhere), which `parse_weight` reads, giving None for what is none, of
+    which `bad_weight` is said; `too_long`: what is said of a line of more than LONGEST words. `escape`: the start of
+    lines that are copied; `verbose`: keep the lines' words as they are; `noise`: numbers of words that are left out.
     """
 
     start: bool = True
@@ -41,6 +41,7 @@ class Handling(NamedTuple):
     adding: bool = False
     weight: str = ""
     parse_weight: Callable[[str], float | None] = leading_float
+    bad_weight: str = "illegal count weight or line too long?"
     too_long: str = "too many words per sentence"
     escape: str | None = None
     verbose: bool = False
@@ -50,7 +51,7 @@ class Handling(NamedTuple):
 
 def handling_of(options: Mapping[str, Any], **others: Any) -> Handling:
     """What the options for text that several commands have ask for, and `others` that one command adds."""
-    weight = "last" if options["text-has-weights-last"] else "first" if options["text-has-weights"] else ""
+    weight = "last" if options.get("text-has-weights-last") else "first" if options["text-has-weights"] else ""
     return Handling(not options["no-sos"], not options["no-eos"], weight=weight, **others)
 
 
@@ -100,22 +101,26 @@ class _Numbering:
 
     def __init__(self, words: WordList, adding: bool) -> None:
         self.words, self.adding = words, adding
-        self.names = NameTable(words.index)
+        # Names that stand for nothing are met one by one.
+        self.names = NameTable({} if words.nameless else words.index)
         self.asked = 0
 
     def numbers(self, fields: Fields) -> Ints:
         """The numbers of words (T,); new ones are added in order of occurrence."""
         numbers = self.names.find(fields, slice(None))
         missing = np.flatnonzero(numbers < 0)
-        if not self.adding or self.words.closed:
+        closed = self.words.closed and self.words.meta_tag is None
+        if (not self.adding or closed) and not self.words.nameless:
             numbers[missing] = self.words.index[self.words.unknown]
+            self.words.missed += len(missing)
             return numbers
         while len(missing):
             now, missing = np.split(missing, [max(_MANY, self.names.size // 2)])
-            numbers[now] = [self.words.number(fields.text(i).decode("latin-1")) for i in now.tolist()]
+            number = self.words.number if self.adding else self.words.known
+            numbers[now] = [number(fields.text(i).decode("latin-1")) for i in now.tolist()]
             self.asked += len(now)
             # Asking one by one has taken about as long as a new table takes.
-            if self.asked > self.names.size // 2:
+            if self.asked > self.names.size // 2 and not self.words.nameless:
                 self.names, self.asked = NameTable(self.words.index), 0
                 numbers[missing] = self.names.find(fields, missing)
                 missing = missing[numbers[missing] < 0]
@@ -136,12 +141,18 @@ def _read_carefully(lines: Lines, blocks: Iterable[bytes], words: WordList, hand
             continue
         found = tokens(line)
         weight: float | None = 1.0
+        text = ""
         if handling.weight:
-            weight = handling.parse_weight(found.pop(0 if handling.weight == "first" else -1))
-        if weight is None:
-            lines.streams.say(f"{lines.position}illegal count weight or line too long?")
-        elif len(found) > LONGEST:
-            lines.streams.say(f"{lines.position}{handling.too_long}")
+            text = found.pop(0 if handling.weight == "first" else -1)
+            weight = handling.parse_weight(text)
+        # A line that gives no n-gram at all is none to ngram-count.
+        useless = handling.adding and bool(handling.weight) and not (found or handling.start or handling.end)
+        if weight is None or useless or len(found) > LONGEST:
+            # What is said of the lines before comes first.
+            yield _sentences(numbers, kept, escapes)
+            numbers, kept, escapes = [], [], []
+            wrong = handling.too_long if weight is not None and not useless else handling.bad_weight.format(text)
+            lines.streams.say(f"{lines.position}{wrong}")
         else:
             numbers += map(number, found)
             mark = f"{weight:g}* " if handling.weight else ""
@@ -157,16 +168,6 @@ def _sentences(
     return Sentences(*columns, shown, escapes, places)
 
 
-def joined(parts: Sequence[Sentences]) -> Sentences:
-    """All sentences in one."""
-    parts = [_sentences([], [], []), *parts]
-    before = np.cumsum([0, *(len(part.lengths) for part in parts)]).tolist()
-    numbers, lengths, weights = (np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True))
-    shown = [text for part in parts for text in part.shown]
-    escapes = [(b + number, line) for b, part in zip(before, parts, strict=False) for number, line in part.escapes]
-    return Sentences(numbers, lengths, weights, shown, escapes)
-
-
 class Marked(NamedTuple):
     """Sentences with their markers: word numbers (T,), lengths (S,); which begin with <s>, and end with </s>, (S,)."""
 
@@ -177,24 +178,19 @@ class Marked(NamedTuple):
 
 
 def mark(sentences: Sentences, words: WordList, handling: Handling) -> Marked:
-    """Put the markers around sentences that they lack; words that are noise go, after the markers are looked for."""
-    start, end = words.index.get(SENTENCE_START, -1), words.index.get(SENTENCE_END, -1)
+    """Turn the sentences around, if asked for, and put the markers around them that they lack.
+
+    Words that are noise go, after the markers are looked for.
+    """
+    start, end = words.start, words.end
     numbers, lengths, size = sentences.numbers, sentences.lengths, len(sentences.lengths)
+    if handling.reverse:
+        last = np.repeat(2 * np.cumsum(lengths) - lengths - 1, lengths)
+        numbers = numbers[last - np.arange(len(numbers))]
     opened, ended = find_markers(numbers, lengths, start, end)
     if handling.noise and (noise := np.isin(numbers, list(handling.noise))).any():
         lengths = np.bincount(np.repeat(np.arange(size), lengths)[~noise], minlength=size)
         numbers = numbers[~noise]
-    if handling.reverse:
-        numbers = _reversed(numbers, lengths, opened, ended)
-    before, after = ~opened & handling.start, ~ended & handling.end
+    before, after = ~opened & (handling.start and start >= 0), ~ended & (handling.end and end >= 0)
     numbers, lengths = add_markers(numbers, lengths, start, end, before, after)
     return Marked(numbers, lengths, opened | before, ended | after)
-
-
-def _reversed(numbers: Ints, lengths: Ints, opened: Mask, ended: Mask) -> Ints:
-    """The words of each sentence from last to first; markers at the ends stay where they are."""
-    start = np.cumsum(lengths) - lengths + np.minimum(opened, lengths)
-    stop = np.cumsum(lengths) - np.minimum(ended, lengths)
-    position = np.arange(len(numbers))
-    first, last = np.repeat(start, lengths), np.repeat(stop, lengths)
-    return numbers[np.where((position >= first) & (position < last), first + last - 1 - position, position)]

@@ -109,12 +109,14 @@ class Streams:
 class Lines:
     """Iterates over the lines of a file that are neither blank nor comments; `number` is that of the last line read.
 
+    `end`: what ends that line, nothing at the end of a file that lacks it.
     A line is read when it is asked for. `blocks` are the file's parts, for those who take it apart themselves.
     """
 
     def __init__(self, name: str, source: BinaryIO, streams: Streams) -> None:
         self.name = name
         self.number = 0
+        self.end = "\n"
         self.source = source
         self.streams = streams
 
@@ -137,12 +139,14 @@ class Lines:
 
     def of(self, physical: Iterable[bytes]) -> Iterator[str]:
         """The lines that physical lines make, which are counted."""
-        begun = ""
+        begun, joined = "", False
         for line_and_end in physical:
-            self.number += 1
+            self.end = "\n" if line_and_end.endswith(b"\n") else ""
+            # What follows a NUL byte is lost, the line end with it: the next line is part of this one.
+            self.number += not joined
             line = line_and_end.decode("latin-1").removesuffix("\n")
-            if "\0" in line:
-                # What follows a NUL byte is lost, the line end with it.
+            joined = "\0" in line
+            if joined:
                 begun += line.partition("\0")[0]
                 continue
             whole, begun = begun + line, ""

@@ -36,8 +36,7 @@ def add_ppls(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> in
     if words + sentences > 0:
         scored = words - unknown - zeroprobs
         streams.print(
-            f"{_whole(zeroprobs)} zeroprobs, logprob= {log10_p:g} ppl= {_perplexity(log10_p, scored + sentences)} "
-            f"ppl1= {_perplexity(log10_p, scored)}\n"
+            f"{_whole(zeroprobs)} zeroprobs, logprob= {log10_p:g} ppl= {_perplexity(log10_p, scored + sentences)}\n"
         )
     return 0
 

@@ -40,24 +40,24 @@ def compute_best_mix(arguments: Sequence[str], streams: Streams, tool: str = TOO
         streams.say(f"iteration {number}, lambda = ({_shown(step.weights)}), ppl = {ppl:g}")
     cumulative = np.cumsum(weights)
     pairwise = np.divide(weights, cumulative, out=np.zeros_like(weights), where=cumulative > 0)
+    pairwise[0] = 1
     streams.print(f"{total:g} non-oov words, best lambda ({_shown(weights)})\n")
     streams.print(f"pairwise cumulative lambda ({_shown(pairwise)})\n")
     return 0
 
 
 def starting_weights(text: str, models: int, tool: str = TOOL) -> list[float]:
-    """The weights that `lambda=` names; what is left to 1 is shared by the other models."""
+    """The weights that `lambda=` names, which need not sum to 1; what is left to 1 is shared by the other models."""
     given = [leading_float(word) for word in text.split()][:models]
     weights = [weight for weight in given if weight is not None and 0 <= weight <= 1]
     left = 1 - sum(weights)
-    if len(weights) < len(given) or left < -1e-6:
-        raise SrilmError(f"{tool}: lambda={text}: numbers between 0 and 1 are needed that do not exceed 1 in sum", 2)
     others = models - len(weights)
+    if len(weights) < len(given) or (others and left < -1e-6):
+        raise SrilmError(f"{tool}: lambda={text}: numbers between 0 and 1 are needed that do not exceed 1 in sum", 2)
     if not others:
-        total = sum(weights)
-        if not total:
+        if not any(weights):
             raise SrilmError(f"{tool}: lambda={text}: not all weights may be 0", 2)
-        return [weight / total for weight in weights]
+        return weights
     return weights + [max(0.0, left) / others] * others
 
 
@@ -69,10 +69,7 @@ def _tokens(names: Sequence[str], streams: Streams, tool: str) -> tuple[Floats, 
         log10_p = [_log10(match[1]) for match in found]
         columns.append((np.array(log10_p), np.array([_count(match[2]) for match in found])))
         if len(found) != len(columns[0][0]):
-            raise SrilmError(
-                f"{tool}: {name} has {len(found)} word probabilities, {names[0]} has {len(columns[0][0])}; "
-                "all must come from ngram -debug 2 -ppl with the same text"
-            )
+            raise SrilmError(f"mismatch in number of samples ({len(columns[0][0])} != {len(found)})")
     return np.array([log10_p for log10_p, _ in columns]).reshape(len(names), -1), columns[0][1]
 
 

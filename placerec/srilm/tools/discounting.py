@@ -1,15 +1,16 @@
 """Which discount each order gets, from options, counts and parameter files: section 5 of our SRILM specification."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from placerec.arrays import Ints, Mask
+from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import LanguageModelError
 from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import (
+    Context,
     Discount,
     Rule,
     absolute,
@@ -24,7 +25,7 @@ from placerec.lm.discounts import (
     natural,
     witten_bell,
 )
-from placerec.srilm.text.numbers import leading_float, leading_int
+from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import SrilmError, Streams, tokens
 from placerec.srilm.tools.options import Parsed
 
@@ -58,14 +59,12 @@ class Choice:
 
 def given_method(options: Parsed, suffix: str) -> tuple[str | None, int]:
     """The method that the options with this suffix ("" or an order) ask for, and how many different ones they name."""
-    named = [name for name in METHODS[:-1] if name + suffix in options.given]
+    # -1, the default of -cdiscount and -addsmooth, is not given.
+    named = [name for name in METHODS[:-1] if name + suffix in options.given and options[name + suffix] != -1]
     if options["kndiscount" + suffix] or options["kn" + suffix]:
         named.append("kndiscount")
     if options["gt" + suffix]:
         named.append("gt")
-    if "ukndiscount" in named and "kndiscount" in named and not options["kndiscount" + suffix]:
-        # A file beside -ukndiscount is that method's own.
-        named.remove("kndiscount")
     return (named[0] if named else None), len(named)
 
 
@@ -82,10 +81,15 @@ def choose(options: Parsed, n: int, *, model_wanted: bool) -> Choice | None:
     value = options[method + source] if method in ("cdiscount", "addsmooth") else 0.0
     minimum, file = options[f"gt{suffix}min"], None
     if method in ("gt", "ukndiscount", "kndiscount"):
-        minimum = float(math.trunc(minimum))
+        minimum = truncated(minimum)
         file = options[("gt" if method == "gt" else "kn") + source]
     interpolate = options["interpolate"] or options["interpolate" + suffix]
     return Choice(method, value, file, minimum, options[f"gt{suffix}max"], interpolate)
+
+
+def truncated(value: float) -> float:
+    """A real number as C makes an unsigned integer of it: cut at the point, modulo 2^32."""
+    return float(math.trunc(value) % 2**32) if abs(value) < 2**63 else 0.0
 
 
 @dataclass
@@ -124,14 +128,14 @@ class Fitter:
                 return Rule(witten_bell, choice.interpolate, choice.minimum)
             case "cdiscount":
                 discount = min(1.0, max(0.0, choice.value))
-                return Rule(absolute(discount), choice.interpolate, choice.minimum, not (bounded and discount == 0))
+                return _perhaps_none(absolute(discount), choice, none=bounded and discount == 0)
             case "addsmooth":
                 delta = max(0.0, choice.value)
-                return Rule(additive(delta), choice.interpolate, choice.minimum, not (bounded and delta == 0))
+                return _perhaps_none(_refusing(additive(delta)), choice, none=bounded and delta == 0)
             case "ndiscount":
                 if self.fractional:
                     raise LanguageModelError("")
-                return Rule(natural, choice.interpolate, choice.minimum)
+                return Rule(_refusing(natural), choice.interpolate, choice.minimum)
         if choice.file and read:
             if choice.method != "gt":
                 self.late.append(n)
@@ -163,7 +167,7 @@ class Fitter:
         if not late:
             self.prepare(n)
         modified = choice.method == "kndiscount"
-        numbers = counts_of_counts(self.counts, n, 4, self.predictable, self.meta)[1:].tolist()
+        numbers = counts_of_counts(self.counts, n, 4, self.predictable, self.meta, once=True)[1:].tolist()
         if self.debug:
             self.streams.say(f"Kneser-Ney smoothing {n}-grams")
             for k, number in enumerate(numbers[: 4 if modified else 2], start=1):
@@ -197,14 +201,45 @@ class Fitter:
 
     def _read(self, choice: Choice) -> Rule:
         """The rule that a parameter file gives; its mincount overrides the option."""
-        numbers = _parameters(choice.file or "", self.streams)
-        minimum = float(numbers.get("mincount", choice.minimum))
-        if choice.method == "gt":
-            top = int(numbers.get("maxcount", 0))
-            factors = [1.0, *(float(numbers.get(f"discount {k}", 1.0)) for k in range(1, top + 1))]
-            return _good_turing_rule(factors if top > 0 else None, minimum, choice.interpolate)
-        names = _PARAMETERS if choice.method == "kndiscount" else _PARAMETERS[:1]
-        return _kneser_ney_rule(tuple(float(numbers.get(name, 0.0)) for name in names), minimum, choice.interpolate)
+        lines, numbers = self.streams.lines(choice.file or ""), {"mincount": choice.minimum, "maxcount": 7.0}
+        for line in lines:
+            key, *values = tokens(line)
+            known = ("mincount", "maxcount", "discount") if choice.method == "gt" else ("mincount", *_PARAMETERS)
+            found = [value for value in map(leading_float, values[: 1 + (key == "discount")]) if value is not None]
+            if key not in known or len(found) != 1 + (key == "discount"):
+                self.streams.say(f"{lines.position}unrecognized parameter")
+                raise SrilmError(f"error in reading discount parameter file {choice.file}")
+            numbers[" ".join([key, *(f"{k:.0f}" for k in found[:-1])])] = found[-1]
+        if choice.method != "gt":
+            discounts = [numbers.get(name, 0.0) for name in _PARAMETERS]
+            return _kneser_ney_rule(discounts, numbers["mincount"], choice.interpolate)
+        factors = [1.0, *(numbers.get(f"discount {k}", 0.0) for k in range(1, int(numbers["maxcount"]) + 1))]
+        for k, factor in enumerate(factors):
+            if factor == 0:
+                self.streams.say(f"{lines.position}warning: discount coefficient {k} = 0.0")
+        return _good_turing_rule(factors if len(factors) > 1 else None, numbers["mincount"], choice.interpolate)
+
+
+def _perhaps_none(discount: Discount, choice: Choice, *, none: bool) -> Rule:
+    """A rule whose discount is `none` where it takes off nothing: all counts are kept, however small."""
+    return Rule(discount, choice.interpolate, 0 if none else choice.minimum, exhaustible=not none)
+
+
+def _refusing(discount: Discount) -> Discount:
+    """A discount that ends in LanguageModelError where it leaves less than nothing, of which SRILM makes nan."""
+
+    def refusing(count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+        factor, lower = discount(count, context, V)
+        finite = (count > 0) & np.isfinite(count) & np.isfinite(context.total)
+        wrong = np.flatnonzero(finite & ~(factor >= 0))
+        if len(wrong):
+            raise LanguageModelError(
+                f"a count of {count[wrong[0]]:g} in a context counted {context.total[wrong[0]]:g} times before"
+                f" {context.types[wrong[0]]:g} words gets no probability by this method; choose another one"
+            )
+        return factor, lower
+
+    return refusing
 
 
 def _good_turing_rule(factors: Sequence[float] | None, minimum: float, interpolate: bool) -> Rule:
@@ -221,19 +256,3 @@ def _kneser_ney_file(minimum: int, discounts: Sequence[float]) -> str:
     number = ".16g" if len(discounts) == 1 else ".16f"
     lines = [f"{name} {value:{number}}\n" for name, value in zip(_PARAMETERS, discounts, strict=False)]
     return f"mincount {minimum}\n" + "".join(lines)
-
-
-def _parameters(name: str, streams: Streams) -> Mapping[str, float]:
-    numbers: dict[str, float] = {}
-    for line in streams.lines(name):
-        *key, text = tokens(line)
-        value = leading_float(text)
-        if key and value is not None:
-            numbers[" ".join(key)] = value
-    return numbers
-
-
-def meta_occurrences(words: Sequence[str], tag: str | None) -> Ints:
-    """k for a word `TAGk`, 0 for any other, int64 (V,)."""
-    found = [leading_int(word[len(tag) :]) if tag is not None and word.startswith(tag) else 0 for word in words]
-    return np.array([k or 0 for k in found], np.int64)

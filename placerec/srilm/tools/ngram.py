@@ -1,14 +1,12 @@
 """`ngram`: scores text with models, and mixes and prunes them; sections 8 to 11 of our SRILM specification."""
 
+import os
 from collections.abc import Sequence
 
 import numpy as np
 
-from placerec.arrays import Singles
-from placerec.lm.score import TokenSequence
-from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.model.arpa_reader import read_tables
-from placerec.srilm.model.scorers import Model, Scorer, event_mask
+from placerec.srilm.model.scorers import Model, Scorer
 from placerec.srilm.text.sentences import Handling, handling_of
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.text.vocabulary import PAUSE, WordList, format_words, read_aliases, read_words
@@ -16,6 +14,7 @@ from placerec.srilm.tools.options import Option, Options, Parsed, parse
 from placerec.srilm.tools.reports import TOKENS, Counting, Printer, print_counts, print_perplexity
 
 TOOL = "ngram"
+BAD_WEIGHT = "bad sentence weight {}"
 
 
 def _refuse(reason: str, **kinds: str) -> dict[str, Option]:
@@ -68,7 +67,6 @@ OPTIONS: Options = {
     "rescore-ngram": Option("string", None, "give the n-grams of this model the probabilities of ours"),
     "ppl": Option("string", None, "the text to score"),
     "text-has-weights": Option("flag", False, "lines begin with a weight"),
-    "text-has-weights-last": Option("flag", False, "lines end with a weight"),
     "escape": Option("string", None, "the start of lines to copy"),
     "counts": Option("string", None, "the counts to score"),
     "count-order": Option("unsigned", 0, "largest n-gram length of -counts (0: -order)"),
@@ -76,7 +74,7 @@ OPTIONS: Options = {
     "float-counts": Option("flag", False, "counts are real numbers"),
     "gen": Option("unsigned", 0, "this many sentences at random"),
     "gen-prefixes": Option("string", None, "starts of sentences for -gen"),
-    "seed": Option("int", None, "of the random numbers for -gen (placerec's own, see docs/srilm.md)"),
+    "seed": Option("int", None, "of the random numbers for -gen"),
     "write-lm": Option("string", None, "write the model"),
     "write-vocab": Option("string", None, "write all words"),
     **_refuse("mixture tables are not specified", read_mix_lms="flag", context_priors="string"),
@@ -86,7 +84,7 @@ OPTIONS: Options = {
     ),
     **_refuse(
         "hidden-event models are not specified",
-        hidden_vocab="string", hidden_not="flag", hiddens="string", df="flag", stop_words="string",
+        hidden_vocab="string", hidden_not="flag", hiddens="string", df="flag", stop_words="string", hmm="flag",
     ),
     **_refuse(
         "maximum-entropy models are not specified", maxent="flag", mix_maxent="flag", maxent_convert_to_arpa="flag"
@@ -102,28 +100,30 @@ OPTIONS: Options = {
         use_server="string", server_port="unsigned", server_maxclients="unsigned", cache_served_ngrams="flag",
     ),
     **_refuse("binary formats are not specified; use ARPA files", write_bin_lm="string", write_oldbin_lm="string"),
-    **_refuse("quantised models are not specified", quantize="unsigned", codebook="string"),
+    **_refuse("quantised models are not specified", quantize="unsigned", codebook="string",
+        write_codebook="string", write_with_codebook="flag"),
     **_refuse("skip n-gram models are not specified", skip="flag"),
     **_refuse("variance pruning is not specified", varprune="float"),
     **_refuse(
         "adaptation to marginals is not specified",
         adapt_marginals="string", base_marginals="string", adapt_marginals_beta="float", adapt_marginals_ratios="flag",
-        dynamic="flag", dynamic_lambda="float",
+        dynamic="flag", dynamic_lambda="float", adapt_mix="flag", adapt_decay="float", adapt_iters="unsigned",
     ),
     **_refuse(
         "N-best lists are not specified",
         nbest="string", rescore="string", nbest_files="string", write_nbest_dir="string", max_nbest="unsigned",
         decipher_lm="string", decipher_order="unsigned", decipher_nounk="flag", decipher_lmw="float",
+        decipher_nbest="string", decipher_nobackoff="flag",
         decipher_wtw="float", rescore_lmw="float", rescore_wtw="float", split_multiwords="flag", no_reorder="flag",
     ),
-    **_refuse("its output is not specified", memuse="flag"),
+    **_refuse("its output is not specified", memuse="flag", nonull="flag"),
 }  # fmt: skip
 
 # With these options alone the model is only asked for probabilities. What other options need is loaded where they are
 # met: most runs score, and a tool should start about as fast as numpy is imported.
 _SCORING = {
     *("order", "debug", "lm", "vocab", "vocab-aliases", "nonevents", "limit-vocab", "unk", "map-unk", "tolower"),
-    *("ppl", "no-sos", "no-eos", "reverse", "noise", "noise-vocab", "text-has-weights", "text-has-weights-last"),
+    *("ppl", "no-sos", "no-eos", "reverse", "noise", "noise-vocab", "text-has-weights"),
     *("escape", "counts", "count-order", "float-counts", "write-vocab"),
 }
 
@@ -169,13 +169,14 @@ class _Run:
         handling = self.handling()
         printer = Printer(self.words, self.streams, options["debug"])
         if options["ppl"]:
-            print_perplexity(options["ppl"], scorer, printer, handling, whole=options["cache"] > 0)
+            print_perplexity(options["ppl"], scorer, printer, handling)
         if options["counts"]:
             order = options["count-order"] or self.order
-            counting = Counting(order, options["float-counts"], options["counts-entropy"], options["escape"])
+            walked = options["cache"] > 0 and options["debug"] < TOKENS
+            counting = Counting(order, options["float-counts"], options["counts-entropy"], options["escape"], walked)
             print_counts(options["counts"], scorer, printer, counting)
         if options["gen"]:
-            self.generate(scorer)
+            self.generate(scorer, handling)
         if models and options["write-lm"]:
             models.write(options["write-lm"])
         if options["write-vocab"]:
@@ -199,6 +200,15 @@ class _Run:
         """What is done to the sentences of `-ppl`."""
         options = self.options
         noise = {self.words.add(PAUSE)}
+        # What stands around a model does not know of its settings.
+        if any(options[name] is not None for name in ("unk-prob", "zeroprob-word", "rescore-ngram")):
+            return Handling(
+                weight="first" if options["text-has-weights"] else "",
+                bad_weight=BAD_WEIGHT,
+                escape=options["escape"],
+                verbose=options["debug"] >= 1,
+                noise=frozenset(noise),
+            )
         if options["noise"]:
             noise.add(self.words.add(options["noise"]))
         if options["noise-vocab"]:
@@ -206,32 +216,19 @@ class _Run:
                 noise |= {self.words.add(word) for word in tokens(line)[:1]}
         return handling_of(
             options.values,
+            bad_weight=BAD_WEIGHT,
             reverse=options["reverse"],
             escape=options["escape"],
             verbose=options["debug"] >= 1,
             noise=frozenset(noise),
         )
 
-    def generate(self, scorer: Scorer) -> None:
+    def generate(self, scorer: Scorer, handling: Handling) -> None:
         """`-gen`: sentences drawn from the model, behind each prefix if there are some."""
-        from placerec.lm.score import generate
+        from placerec.srilm.tools.generation import Generator, drand48, print_sentences
 
-        options, index = self.options, self.words.index
-        rng = np.random.Generator(np.random.PCG64(None if options["seed"] is None else abs(options["seed"])))
-        start, end = index[SENTENCE_START], index[SENTENCE_END]
-        events = event_mask(self.words)
-
-        def spread(history: Sequence[int]) -> Singles:
-            ids = np.array([*history, end], np.int64)
-            place = np.arange(len(ids))
-            view = scorer(TokenSequence(ids, place == 0, place == len(history)))
-            return np.where(events, view.distribution(len(history)), np.float32(-np.inf))
-
-        prefixes = map(tokens, self.streams.lines(options["gen-prefixes"])) if options["gen-prefixes"] else [[]]
-        for prefix in prefixes:
-            known = [self.words.known(word) for word in prefix]
-            opening = [] if options["no-sos"] or known[:1] == [start] else [start]
-            for _ in range(options["gen"]):
-                drawn = generate(spread, [*opening, *known], end, rng, order=self.order)
-                line = [*prefix, *(str(self.words.words[number]) for number in drawn)]
-                self.streams.print(" ".join(line) + "\n")
+        options = self.options
+        seed = int.from_bytes(os.urandom(4), "big") if options["seed"] is None else options["seed"]
+        generator = Generator(scorer, self.words, drand48(seed), self.streams, order=self.order, debug=options["debug"])
+        prefixes = [*map(tokens, self.streams.lines(options["gen-prefixes"]))] if options["gen-prefixes"] else [[]]
+        print_sentences(generator, options["gen"], prefixes, self.words.start if handling.start else None)

@@ -13,11 +13,11 @@ from placerec.lm.mutable import insert_prefixes
 from placerec.lm.prune import prune
 from placerec.lm.stored_text import StoredText
 from placerec.srilm.order.counts import EstimationMessages, FirstSeen
-from placerec.srilm.text.counts_file import Table, parse_count, read_counts
+from placerec.srilm.text.counts_file import MOST, TOO_MANY, Table, parse_count, read_counts
 from placerec.srilm.text.sentences import handling_of, mark, read_sentences
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 from placerec.srilm.text.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
-from placerec.srilm.tools.discounting import MODIFYING, Fitter, choose, given_method, meta_occurrences
+from placerec.srilm.tools.discounting import MODIFYING, Fitter, choose, given_method, truncated
 from placerec.srilm.tools.options import Option, Options, Parsed, parse
 
 TOOL = "ngram-count"
@@ -84,9 +84,17 @@ OPTIONS: Options = {
     "init-lm": Option("string", None, "the count model to begin with"),
     "em-iters": Option("unsigned", 100, "so many steps at most for -count-lm"),
     "em-delta": Option("float", 0.001, "the change in log likelihood at which -count-lm ends"),
+    "maxent": Option("flag", False, "maximum-entropy models (refused, as by SRILM built without liblbfgs)"),
     "read-google": Option("string", None, "counts in Google's folders are not specified", refused=True),
     "skip": Option("flag", False, "skip n-gram models are not specified", refused=True),
     "varprune": Option("float", 0.0, "variance pruning is not specified", refused=True),
+    "skip-init": Option("float", 0.5, "skip n-gram models are not specified", refused=True),
+    "stop-words": Option("string", None, "stop-word models are not specified", refused=True),
+    "tag": Option("flag", False, "tagged models are not specified", refused=True),
+    "tagged": Option("flag", False, "tagged models are not specified", refused=True),
+    "memuse": Option("flag", False, "its output is not specified", refused=True),
+    "write-binary": Option("string", None, "binary formats are not specified; use -write", refused=True),
+    "write-binary-lm": Option("flag", False, "binary formats are not specified; use ARPA files", refused=True),
 }
 
 
@@ -100,10 +108,14 @@ def ngram_count(arguments: Sequence[str], streams: Streams, tool: str = TOOL) ->
 
 
 def _run(options: Parsed, streams: Streams) -> None:
+    if options["maxent"]:
+        raise SrilmError("maxent model estimation not supported (requires liblbfgs)", 2)
     if given_method(options, "")[1] > 1:
         raise SrilmError("conflicting default discounting options", 2)
     words = _read_vocabulary(options, streams)
     counts, first = _read_all(options, words, streams)
+    if options["order"] < 1:
+        streams.say("LM order must be positive -- set to 1")
     if options["count-lm"] and options["lm"] is not None:
         # Not needed by those who count.
         from placerec.srilm.tools.count_lm import write_count_model
@@ -112,9 +124,8 @@ def _run(options: Parsed, streams: Streams) -> None:
         _write_rest(options, counts, words, first, streams)
         return
     vocabulary = counts.trie.vocabulary
-    meta = meta_occurrences(vocabulary.words, options["meta-tag"])
-    meta_words = np.array([words.is_meta(word) for word in vocabulary.words], bool)
-    predictable = ~vocabulary.mask(words.non_events) & ~meta_words
+    meta = np.array([words.occurrences(word) for word in vocabulary.words], np.int64)
+    predictable = ~vocabulary.mask(words.non_events) & (meta < 0)
     fitter = Fitter(counts, predictable, meta, options, streams, options["debug"], options["float-counts"])
     rules = []
     wanted = options["lm"] is not None
@@ -143,34 +154,54 @@ def _read_vocabulary(options: Parsed, streams: Streams) -> WordList:
 def _read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[NgramCounts, FirstSeen]:
     """All counts, and what tells the order in which n-grams were first seen."""
     order, fractional = options["order"], options["float-counts"]
+    limited = options["limit-vocab"]
     tables: list[Table] = []
     only = None
     if options["intersect"]:
-        only = read_counts(options["intersect"], order, words, streams, fractional=fractional)
+        only = read_counts(options["intersect"], order, words, streams, fractional=fractional, limited=limited)
         tables.append(only.emptied())
     if options["read"]:
-        limited = options["limit-vocab"]
-        table = read_counts(options["read"], order, words, streams, fractional=fractional, limited=limited)
+        minima = None
         if options["read-with-mincounts"]:
-            table = table.at_least([options[f"gt{n}min"] for n in range(1, 10)], words)
+            minima = [truncated(options[f"gt{n}min"]) for n in (*range(1, 10), "")]
+        table = read_counts(
+            options["read"], order, words, streams, fractional=fractional, limited=limited, minima=minima
+        )
         tables.append(table.within(only) if only else table)
     text = None
     if options["text"] and options["write-text"]:
         lines = streams.lines(options["text"])
         with streams.output(options["write-text"]) as file:
-            file.writelines(f"{line}\n".encode("latin-1") for line in lines)
+            file.writelines((line + lines.end).encode("latin-1") for line in lines)
     elif options["text"]:
         text = _read_text(options, words, streams)
+    counts = _tabulated(order, tables, text, words, fractional=fractional)
+    if not fractional and _total(tables, text) > MOST:
+        # Sums that were too large differ from those of real numbers.
+        real = _tabulated(order, tables, text, words, fractional=True)
+        if any((np.abs(a - b) > 2.0**62).any() for a, b in zip(counts.counts, real.counts, strict=True)):
+            raise SrilmError(TOO_MANY.format("a sum of counts"))
+    if options["recompute"]:
+        counts = recomputed(counts)
+    return counts, FirstSeen(tables, text, words)
+
+
+def _tabulated(
+    order: int, tables: Sequence[Table], text: StoredText | None, words: WordList, *, fractional: bool
+) -> NgramCounts:
     parts = [table.count(max(1, order), words, fractional=fractional) for table in tables]
     if text is not None and order > 0:
         vocabulary, sorted_number = words.sorted()
         parts.append(count_text(text, order, vocabulary, renumbered=sorted_number, fractional=fractional))
     if not parts:
         parts.append(Table().count(max(1, order), words, fractional=fractional))
-    counts = parts[0] if len(parts) == 1 else add_counts(*parts)
-    if options["recompute"]:
-        counts = recomputed(counts)
-    return counts, FirstSeen(tables, text, words)
+    return parts[0] if len(parts) == 1 else add_counts(*parts)
+
+
+def _total(tables: Sequence[Table], text: StoredText | None) -> float:
+    blocks = text if text is not None and text.weighted else ()
+    weights = (block.weights.astype(np.float64) @ block.lengths for block in blocks if block.weights is not None)
+    return float(sum(sum(table.counts) for table in tables) + sum(weights))
 
 
 def _read_text(options: Parsed, words: WordList, streams: Streams) -> StoredText:
@@ -179,26 +210,24 @@ def _read_text(options: Parsed, words: WordList, streams: Streams) -> StoredText
     handling = handling_of(options.values, adding=True, parse_weight=parse_weight, too_long="line too long?")
     text = StoredText()
     lines = streams.lines(options["text"])
-    sentences = found = unknown = 0
+    sentences = found = 0
+    words.missed = 0
     for part in read_sentences(lines, words, handling):
         marked = mark(part, words, handling)
         sentences += len(part.lengths)
         found += int((marked.lengths - marked.opened - marked.ended).sum())
-        unknown += int((part.numbers == words.index.get(words.unknown, -1)).sum())
         if len(part.lengths):
             text.add(marked.numbers, marked.lengths, part.weights if handling.weight else None)
     if options["debug"] >= 1:
-        streams.say(f"{lines.position}{sentences} sentences, {found} words, {unknown} OOVs")
+        streams.say(f"{lines.position}{sentences} sentences, {found} words, {words.missed} OOVs")
         if found + sentences > 0:
-            streams.say("0 zeroprobs, logprob= 0 ppl= 1 ppl1= " + ("1" if found else "undefined"))
+            streams.say("0 zeroprobs, logprob= 0 ppl= 1 ppl1= " + ("1" if found > words.missed else "undefined"))
     return text
 
 
 def _write_model(
     options: Parsed, fitter: Fitter, rules: Sequence[Rule], words: WordList, first: FirstSeen, streams: Streams
 ) -> None:
-    if options["order"] < 1:
-        streams.say("LM order must be positive -- set to 1")
     announced = {n: MODIFYING.format(n) for n in fitter.late if fitter.prepare(n, silent=True)}
     trace = EstimationMessages(fitter.counts, first, streams, options["debug"], announced=announced)
     mutable = estimate_mutable(
@@ -207,7 +236,7 @@ def _write_model(
         non_events=words.non_events,
         open_vocabulary=words.open_unknown,
         unknown=words.unknown,
-        meta_tag=options["meta-tag"],
+        meta=fitter.meta,
         trust_totals=options["trust-totals"],
         alias_counts=np.array(words.names(fitter.counts.trie.vocabulary), np.int64),
         trace=trace,
@@ -234,7 +263,8 @@ def _write_rest(options: Parsed, counts: NgramCounts, words: WordList, first: Fi
     orders = [n for n in range(1, 10) if options[f"write{n}"]]
     for n in orders:
         streams.write(options[f"write{n}"], show(only=n) if n <= counts.order else "")
-    files = [name for name in options.given if name.startswith(("kn", "gt")) and name[2:] in ("", *"123456789")]
+    orders_used = [str(n) for n in range(1, min(9, max(1, options["order"])) + 1)]
+    files = [name for name in options.given if name.startswith(("kn", "gt")) and name[2:] in ("", *orders_used)]
     silent = orders or files or any(options[name] for name in ("lm", "write-vocab", "write-vocab-index", "write-text"))
     target = options["write"] or (None if silent else "-")
     if target:

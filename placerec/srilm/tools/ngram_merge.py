@@ -41,9 +41,8 @@ def _merged(heads: Heads, files: Sequence[Iterator[tuple[list[str], float]]], fr
     """The lines of the n-grams of all files in order, each with its sum; `heads` holds each file's next n-gram."""
     heapq.heapify(heads)
     while heads:
-        words = heads[0][0]
-        total: float = 0
-        emptied = []
+        words, i, total = heapq.heappop(heads)
+        emptied = [i]
         # A file's next line waits until the n-gram is written: what an unsorted file repeats stays apart.
         while heads and heads[0][0] == words:
             _, i, count = heapq.heappop(heads)

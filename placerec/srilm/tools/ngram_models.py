@@ -1,11 +1,12 @@
 """The models of `ngram` where more than scoring is asked for: mixed, changed, cached, written; section 11."""
 
-from functools import partial
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 
 import numpy as np
 
 from placerec.lm.arpa import row_blocks
-from placerec.lm.logs import LOG_ZERO
+from placerec.lm.logs import LOG_ZERO, shown
 from placerec.lm.mix import merge, merge_weight
 from placerec.lm.mutable import MutableModel, reweigh, unite
 from placerec.lm.prune import prune, prune_improbable
@@ -14,7 +15,8 @@ from placerec.srilm.model.arpa import read_model, tables_of
 from placerec.srilm.model.count_models import CountModel, format_count_model, read_count_model
 from placerec.srilm.model.mixed_scorers import Cached, Lenient, LogLinear, Mixture
 from placerec.srilm.model.scorers import Model, Null, Scorer
-from placerec.srilm.order.messages import ContextTimes, Messages, message_order
+from placerec.srilm.order.contexts import ContextTimes, merged_times, message_order
+from placerec.srilm.order.messages import Messages
 from placerec.srilm.text.streams import SrilmError, Streams
 from placerec.srilm.text.vocabulary import WordList
 from placerec.srilm.tools.options import Parsed
@@ -30,7 +32,8 @@ class Models:
         self.debug = options["debug"]
         self.words = words
         self.mutable: MutableModel | None = None
-        self.times: ContextTimes | None = None
+        # When the model's contexts were made: worth finding only where the order of messages asks for it.
+        self.times: Callable[[], ContextTimes] | None = None
         self.counted: CountModel | None = None
 
     def scorer(self) -> Scorer:
@@ -41,13 +44,16 @@ class Models:
             scorer = self.counting() if self.options["count-lm"] else self.backing_off()
             if self.options["cache"]:
                 self.mutable = None
-                scorer = partial(Cached, scorer, self.words, self.options["cache"], self.options["cache-lambda"])
+                weight, recent = self.options["cache-lambda"], list[int]()
+                self.check_priors([1 - weight, weight])
+                scorer = partial(Cached, scorer, self.words, self.options["cache"], weight, self.debug, recent)
         scorer = self.lenient(scorer)
         return self.rescored(scorer) if self.options["rescore-ngram"] else scorer
 
     def backing_off(self) -> Scorer:
         """The back-off model of -lm, and what is mixed with it."""
-        self.mutable, self.times = self.read("lm", "lm file")
+        self.mutable, times = self.read("lm", "lm file")
+        self.times = lambda: times
         return self.mixed()
 
     def counting(self) -> Scorer:
@@ -84,8 +90,9 @@ class Models:
 
     def messages(self, mutable: MutableModel) -> Messages:
         """Who says what happens to a model."""
-        order = message_order(mutable.trie, self.times) if self.times else None
-        return Messages(mutable.trie, self.streams, self.debug, weighed=order)
+        numbers, times = self.words.numbers(mutable.trie.vocabulary), self.times
+        order = message_order(mutable.trie, times) if times else None
+        return Messages(mutable.trie, self.streams, self.debug, numbers=numbers, weighed=order)
 
     def components(self) -> tuple[list[str], list[float]]:
         """The options that name models to mix in, and the weights of all models, -lm's first."""
@@ -104,18 +111,41 @@ class Models:
         dynamic = options["bayes"] is not None or options["loglinear-mix"]
         if not dynamic:
             for k, option in enumerate(others, start=1):
-                self.mutable, other = self.together(self.model(), self.read(option, "mix-lm file")[0])
+                read, its = self.read(option, "mix-lm file")
+                self.mutable, other = self.together(self.model(), read)
+                self.times = self.times_merged(self.mutable, other, its)
                 merge(self.mutable, other, merge_weight(weights, k), self.messages(self.mutable))
         self.change()
-        model = Model(partial(tables_of, self.model(), self.words), self.words, skipping=options["skipoovs"])
+        # SRILM's dynamic mixtures do not hand -skipoovs down.
+        back = min(2, self.order - 1) if options["skipoovs"] and not (dynamic and others) else None
+        model = Model(partial(tables_of, self.model(), self.words), self.words, back)
         if not dynamic or not others:
             return model
         mutables = [self.read(option, "mix-lm file")[0] for option in others]
         models = [model, *(Model(partial(tables_of, mutable, self.words), self.words) for mutable in mutables)]
         self.mutable = None
         if options["loglinear-mix"]:
-            return partial(LogLinear, models, weights, self.words)
-        return partial(Mixture, models, weights, options["bayes"], options["bayes-scale"], self.debug == 3)
+            return partial(LogLinear, models, weights, self.words, self.debug, {})
+        self.check_priors(weights)
+        return partial(Mixture, models, weights, options["bayes"], options["bayes-scale"], self.debug >= 3)
+
+    def check_priors(self, weights: Sequence[float]) -> None:
+        """Say which weights of a mixture are none."""
+        for weight in weights:
+            if not 0 <= weight <= 1:
+                self.streams.say(f"warning: mixture prior out of range: {shown(weight)}")
+
+    def times_merged(self, model: MutableModel, other: MutableModel, its: ContextTimes) -> Callable[[], ContextTimes]:
+        """When the contexts of the model will have been made once another one is merged into it."""
+        times, numbers = self.times, self.words.numbers(model.trie.vocabulary)
+        new = [theirs & ~own for theirs, own in zip(other.stored, model.stored, strict=True)]
+
+        def found() -> ContextTimes:
+            assert times is not None
+            added = [np.unique(model.trie.prefix(n)[mask]) for n, mask in enumerate(new[1:], start=2)]
+            return merged_times(times(), its, model, [np.zeros(0, np.int64), *added], numbers)
+
+        return cache(found)
 
     def model(self) -> MutableModel:
         """The model that was read; there is one wherever this is called."""
@@ -150,6 +180,7 @@ class Models:
         unknown_p, stand_in = self.options["unk-prob"], self.options["zeroprob-word"]
         if unknown_p is None and stand_in is None:
             return scorer
+        self.mutable = self.counted = None
         if unknown_p == LOG_ZERO:
             unknown_p = -np.inf
         number = None if stand_in is None else self.words.add(stand_in)
@@ -159,15 +190,16 @@ class Models:
         """`-rescore-ngram` (section 11.6): another model's n-grams with the probabilities that `scorer` gives them."""
         options = self.options
         own = WordList(lower=options["tolower"], open_unknown=options["unk"])
-        mutable, self.times = self.read("rescore-ngram", "lm file", words=own)
+        mutable, times = self.read("rescore-ngram", "lm file", words=own)
+        self.times = lambda: times
         index, unknown = self.words.index, self.words.index[self.words.unknown]
         numbers = np.array([index.get(word, unknown) for word in mutable.trie.vocabulary.words], np.int64)
         for n in range(mutable.order, 0, -1):
             rows = np.flatnonzero(mutable.stored[n - 1])
             sequence = TokenSequence.of_rows(numbers[mutable.trie.matrix(n)[rows]])
             mutable.log10_p[n - 1][rows] = scorer(sequence).score().log10_p[n - 1 :: n]
-        reweigh(mutable, self.messages(mutable))
         self.mutable, self.words = mutable, own
+        reweigh(mutable, self.messages(mutable))
         return Model(partial(tables_of, mutable, own), own)
 
     def write(self, name: str) -> None:

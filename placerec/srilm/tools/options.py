@@ -76,12 +76,13 @@ def parse(tool: str, options: Options, arguments: Sequence[str], streams: Stream
 
 def _take(parsed: Parsed, name: str, option: Option, argument: str, text: str, streams: Streams) -> None:
     value: Any = text if option.kind == "string" else (leading_float if option.kind == "float" else leading_int)(text)
+    current = parsed[name] or 0
     if value is None and option.kind == "float":
-        wrong = f'non-floating-point argument "{text}".  Using default: {option.default or 0:g}.'
+        wrong = f'non-floating-point argument "{text}".  Using default: {current:g}.'
     elif value is None:
-        wrong = f'a non-numeric argument "{text}".  Using default: {option.default}'
+        wrong = f'a non-numeric argument "{text}".  Using default: {current}'
     elif option.kind == "unsigned" and value < 0:
-        wrong = f'a negative argument "{text}".  Using default: {option.default}.'
+        wrong = f'a negative argument "{text}".  Using default: {current}.'
     else:
         parsed.values[name] = value
         parsed.given.add(name)

@@ -6,14 +6,13 @@ from functools import cached_property, reduce
 
 import numpy as np
 
-from placerec.arrays import Floats, Ints, Mask
-from placerec.lm.logs import p_of
+from placerec.arrays import Floats, Ints, Mask, Singles
+from placerec.lm.logs import p_of, shown
 from placerec.lm.perplexity import Ranks, Totals, rank_word, tally_sentences
 from placerec.lm.score import TokenSequence
-from placerec.lm.vocabulary import SENTENCE_END
-from placerec.srilm.model.scorers import ModelView, Scored, Scorer, View, event_numbers
+from placerec.srilm.model.scorers import Scored, Scorer, View, event_mask, event_numbers
 from placerec.srilm.text.counts_file import MALFORMED, split_count
-from placerec.srilm.text.sentences import Handling, Marked, Sentences, joined, mark, read_sentences
+from placerec.srilm.text.sentences import Handling, Marked, Sentences, mark, read_sentences
 from placerec.srilm.text.streams import Streams
 from placerec.srilm.text.vocabulary import WordList
 
@@ -21,6 +20,8 @@ TOKENS, SUMS, RANKS = 2, 3, 4
 
 
 def _block(totals: Totals, ranks: Ranks | None) -> str:
+    # A negative weight times no OOVs is no -0.
+    totals = Totals(*(total + 0.0 for total in totals))
     text = f"{totals.sentences:.16g} sentences, {totals.words:.16g} words, {totals.oovs:.16g} OOVs\n"
     if not totals.words + totals.sentences > 0:
         return text
@@ -30,7 +31,7 @@ def _block(totals: Totals, ranks: Ranks | None) -> str:
 
 
 def _number(value: float) -> str:
-    return f"{value:.7g}"
+    return shown(value, 7)
 
 
 def _rank_lines(ranks: Ranks) -> str:
@@ -79,23 +80,21 @@ class Printer:
             return ""
         total = float(p_of(view.distribution(t)[self.events]).sum())
         if abs(total - 1) > 0.0001:
-            shown = " ".join(self.name(number) for number in context[::-1].tolist())
-            self.streams.say(f"\nwarning: word probs for this context sum to {total:g} != 1 : {shown}")
+            words = " ".join(self.name(number) for number in context[::-1].tolist())
+            self.streams.say(f"\nwarning: word probs for this context sum to {shown(total)} != 1 : {words}")
         return f" / {_number(total)}"
 
     def rank(self, view: View, t: int, word: int, log10_p: float, *, end: bool, weight: float = 1) -> Ranks:
         """The rank of a token's word among all words, as tallies of one token."""
         known = word != self.words.index[self.words.unknown]
-        return rank_word(log10_p, view.distribution(t)[self.events], known=known, end=end, weight=weight)
+        marker = word == self.words.end
+        return rank_word(log10_p, view.distribution(t)[self.events], known=known, end=end, marker=marker, weight=weight)
 
 
-def print_perplexity(name: str, scorer: Scorer, printer: Printer, handling: Handling, *, whole: bool) -> None:
-    """`-ppl`: score a text and print what `printer.debug` asks for; `whole`: in one go (a cache runs on and on)."""
-    parts = read_sentences(printer.streams.lines(name), printer.words, handling)
-    if whole:
-        parts = iter([joined(list(parts))])
+def print_perplexity(name: str, scorer: Scorer, printer: Printer, handling: Handling) -> None:
+    """`-ppl`: score a text and print what `printer.debug` asks for."""
     summary = _Summary(printer)
-    for sentences in parts:
+    for sentences in read_sentences(printer.streams.lines(name), printer.words, handling):
         summary.add(sentences, *_score_sentences(scorer, printer, sentences, mark(sentences, printer.words, handling)))
     summary.finish(name)
 
@@ -107,7 +106,7 @@ def _score_sentences(
     sequence, lengths = _sequence(marked), marked.lengths
     ended = lengths - marked.opened > 0
     last = sequence.ids[(np.cumsum(lengths) - 1)[ended]]
-    ended[ended] = last == printer.words.index.get(SENTENCE_END, -1)
+    ended[ended] = last == printer.words.end
     view = scorer(sequence)
     scored = view.score()
     unknown = sequence.ids == printer.words.index[printer.words.unknown]
@@ -205,16 +204,22 @@ class _Summary:
 
 _Table = dict[tuple[int, ...], float]
 _Sums = tuple[Totals, Ranks]
+# SRILM's counts are of 64 bits.
+_MOST = 2**64 - 1
 
 
 @dataclass(frozen=True)
 class Counting:
-    """How counts are read and scored: n-grams up to `order`; `entropy`: weighted by the model's joint probability."""
+    """How counts are read and scored: n-grams up to `order`; `entropy`: weighted by the model's joint probability.
+
+    `walked`: in the order of SRILM's hash tables, not sorted; a cache depends on it.
+    """
 
     order: int
     fractional: bool = False
     entropy: bool = False
     escape: str | None = None
+    walked: bool = False
 
 
 def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting) -> None:
@@ -229,66 +234,91 @@ def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting
                 table = {}
             printer.streams.print(line + "\n")
             continue
-        words, count = split_count(line, counting.fractional)
+        words, count = split_count(line, counting.fractional, most=_MOST)
         if count is None:
             printer.streams.say(f"{lines.position}{MALFORMED}")
         elif len(words) <= counting.order:
             ngram = tuple(map(printer.words.known, words))
-            table[ngram] = table.get(ngram, 0) + count
-    parts.append(_group(table, scorer, printer, counting, shown=bool(parts) or printer.debug >= 1))
-    printer.streams.print(f"file {name}: {_counts_block(printer, _sum(parts), counting)}")
+            total = table.get(ngram, 0) + count
+            table[ngram] = total if counting.fractional or total <= _MOST else total - _MOST - 1
+    if table or parts:
+        parts.append(_group(table, scorer, printer, counting, shown=bool(parts) or printer.debug >= 1))
+    whole = printer.block(*_sum(parts)) if parts else _block(Totals(), None)
+    printer.streams.print(f"file {name}: {whole}")
 
 
 def _sum(parts: Sequence[_Sums]) -> _Sums:
     return reduce(lambda a, b: (a[0].plus(b[0]), a[1].plus(b[1])), parts, (Totals(), Ranks()))
 
 
-def _counts_block(printer: Printer, sums: _Sums, counting: Counting) -> str:
-    totals, ranks = sums
-    return printer.block(totals._replace(sentences=0, words=1) if counting.entropy else totals, ranks)
-
-
 def _group(table: _Table, scorer: Scorer, printer: Printer, counting: Counting, *, shown: bool) -> _Sums:
     """Score the n-grams between two escaped lines."""
-    parts = []
+    parts, ranks_of = [], _walk(table) if counting.walked else {}
     for n in range(1, counting.order + 1):
         ngrams = [ngram for ngram, count in table.items() if len(ngram) == n and count]
-        ngrams.sort(key=lambda ngram: [printer.name(word) for word in ngram])
+        ngrams.sort(key=lambda ngram: ranks_of[ngram] if ranks_of else [printer.name(word) for word in ngram])
         if ngrams:
             counts = np.array([table[ngram] for ngram in ngrams], np.float64)
             parts.append(_score_ngrams(np.array(ngrams, np.int64), counts, scorer, printer, counting))
-    sums = _sum(parts)
+    totals, ranks = _sum(parts)
+    if counting.entropy:
+        totals = totals._replace(sentences=0, words=1)
     if shown:
-        printer.streams.print(_counts_block(printer, sums, counting) + "\n")
-    return sums
+        printer.streams.print(printer.block(totals, ranks) + "\n")
+    return totals, ranks
+
+
+def _walk(table: _Table) -> dict[tuple[int, ...], int]:
+    """The place of each n-gram, and of its prefixes, among those of its length in SRILM's unsorted order."""
+    from placerec.srilm.order.hashing import table_order
+
+    places: dict[tuple[int, ...], int] = {(): 0}
+    for n in range(1, max(map(len, table), default=0) + 1):
+        nodes = sorted({ngram[:n]: 0 for ngram in table if len(ngram) >= n}, key=lambda node: places[node[:-1]])
+        parents = [places[node[:-1]] for node in nodes]
+        tables = np.unique(np.array(parents, np.int64), return_inverse=True)[1]
+        order = table_order(tables, np.array([node[-1] for node in nodes], np.uint64))
+        places |= {nodes[i]: place for place, i in enumerate(order.tolist())}
+    return places
 
 
 def _score_ngrams(ngrams: Ints, counts: Floats, scorer: Scorer, printer: Printer, counting: Counting) -> _Sums:
     """Score n-grams of one length, a matrix (m, n), that occur `counts` (m,) times."""
-    m, n = ngrams.shape
-    # A word more behind each n-gram: the joint probability of what stands before it is the n-gram's.
-    behind = np.full((m, 1), printer.words.index[printer.words.unknown])
-    sequence = TokenSequence.of_rows(np.concatenate([ngrams, behind], axis=1))
-    sequence = sequence._replace(scored=sequence.place == n - 1)
+    n = ngrams.shape[1]
+    sequence = TokenSequence.of_rows(ngrams)
+    weights = counts * p_of(_joint_log10_p(ngrams, scorer, printer.words)) if counting.entropy else counts
     view = scorer(sequence)
     scored = view.score()
-    weights = counts
-    if counting.entropy and isinstance(view, ModelView):
-        weights = counts * p_of(view.joint(n)[n :: n + 1])
-    end, unknown = printer.words.index.get(SENTENCE_END), printer.words.index[printer.words.unknown]
-    total, ranks = Totals(), Ranks()
-    for i, (ngram, count, weight) in enumerate(zip(ngrams.tolist(), counts.tolist(), weights.tolist(), strict=True)):
-        t, word = i * (n + 1) + n - 1, ngram[-1]
-        log10_p = float(scored.log10_p[t])
-        zero, last = log10_p == -np.inf, word == end
-        oov, impossible = zero and word == unknown, zero and word != unknown
-        counted = Totals(last, not last, oov, impossible).times(count)
-        total = total.plus(counted._replace(log10_p=0 if zero else weight * log10_p))
-        if printer.debug >= TOKENS:
-            context = " ".join(printer.name(number) for number in ngram[-2::-1])
-            p = float(p_of(scored.log10_p[t : t + 1])[0])
-            text = printer.token(word, context + " ", scored.tag(t), p, log10_p, weight)
-            printer.streams.print(text + printer.sum(view, t, np.array(ngram[:-1], np.int64)) + "\n")
+    log10_p, word = scored.log10_p[n - 1 :: n], ngrams[:, -1]
+    end, unknown = word == printer.words.end, word == printer.words.index[printer.words.unknown]
+    zero = np.isneginf(log10_p)
+    chosen = (np.where(mask, counts, 0) for mask in (end, ~end, zero & unknown, zero & ~unknown))
+    logs = np.where(zero, 0, weights * log10_p.astype(np.float64))
+    # Summed one after the other, as SRILM does.
+    total, ranks = Totals(*(float(np.add.accumulate(column)[-1]) for column in (*chosen, logs))), Ranks()
+    for i, (ngram, count, weight) in enumerate(
+        zip(ngrams.tolist(), counts.tolist(), weights.tolist(), strict=True) if printer.debug >= TOKENS else ()
+    ):
+        t = i * n + n - 1
+        context = " ".join(printer.name(number) for number in ngram[-2::-1])
+        p, log_p = float(p_of(log10_p[i : i + 1])[0]), float(log10_p[i])
+        text = printer.token(ngram[-1], context + " ", scored.tag(t), p, log_p, weight)
+        printer.streams.print(text + printer.sum(view, t, np.array(ngram[:-1], np.int64)) + "\n")
         if printer.debug >= RANKS:
-            ranks = ranks.plus(printer.rank(view, t, word, log10_p, end=last, weight=count))
+            ranks = ranks.plus(printer.rank(view, t, ngram[-1], log_p, end=bool(end[i]), weight=count))
     return total, ranks
+
+
+def _joint_log10_p(ngrams: Ints, scorer: Scorer, words: WordList) -> Singles:
+    """log10 of the joint probability of the words of n-grams, float32 (m,), by a scorer (section 11.2).
+
+    Each word is predicted from those before it; the first counts as </s> if it is <s>. Words that are never predicted
+    and have probability 0 are left out.
+    """
+    sequence = TokenSequence.of_rows(ngrams)._replace(scored=np.ones(ngrams.size, bool))
+    asked = ngrams.copy()
+    start, end = words.start, words.end
+    asked[:, 0] = np.where(asked[:, 0] == start, end, asked[:, 0])
+    log10_p = scorer(sequence).score(asked.ravel()).log10_p.reshape(ngrams.shape)
+    silent = np.isneginf(log10_p) & ~event_mask(words)[asked]
+    return np.add.accumulate(np.where(silent, np.float32(0), log10_p), axis=1, dtype=np.float32)[:, -1]
