@@ -18,7 +18,7 @@ import numpy as np
 from placerec.errors import SourceError, at
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
-from placerec.frames.folder import WANTED, FileFrames, list_folder, natural_key, read_frames
+from placerec.frames.folder import EMPTY, WANTED, FileFrames, Listing, is_text, list_folder, natural_key, read_frames
 from placerec.frames.intervals import Intervals, checked_seconds, find_intervals
 from placerec.frames.layouts import (
     ABOVE_CAMERAS,
@@ -60,7 +60,7 @@ class _Found:
     """A sequence that is not read yet: `folder` names it, and `camera` holds its frames.
 
     `camera` is the folder of its images, or what is recorded in, of so many `cameras` if it is one of several; `place`
-    its label if it is one place.
+    its label if it is one place; `listing` all that is in the folder.
     """
 
     folder: Path
@@ -69,6 +69,7 @@ class _Found:
     places: Path | None = None
     place: str = ""
     cameras: int = 0
+    listing: Listing = EMPTY
 
 
 def find_sequences(
@@ -90,6 +91,9 @@ def find_sequences(
     _check_twice(found)
     _tell_unused(found, options)
     one_file = options.labels is not None and not options.labels.is_dir()
+    for item in found:
+        if not is_text(_absolute(item.folder).name):
+            raise SourceError(f"{item.folder}: its name is not UTF-8, or holds a tab or a line end; rename it")
     own = [LIST_NAME if item.folder == STREAM else own_name(item.folder) for item in found]
     names = unique_names([(name, item.folder) for name, item in zip(own, found, strict=True)], SourceError)
     takers = list(filter(_is_recorded, found)) or list(filter(_is_unlabelled, found))
@@ -118,6 +122,8 @@ def _read(
             listed = tuple(replace(frame, time=time) for frame, time in zip(listed, times.tolist(), strict=True))
         part = part_of(times, options.begin, options.end, STDIN)
         return Sequence(name, listed[part][:: options.every], item.folder), where
+    if item.listing.unread:
+        log.warning("%s: not read: %s", item.camera, item.listing.unread)
     if _is_recorded(item):
         intervals = find_intervals(item.camera, name, options.labels, alone=alone)
         frames, recording = read_recording(item.camera, intervals, options)
@@ -134,6 +140,9 @@ def _read(
         where = [(frame.place, str(frame.path)) for frame in files if frame.place]
     elif intervals := find_intervals(item.folder, name, options.labels, alone=alone, images=True):
         files, where = _labelled(item, files, intervals, options), intervals.positions()
+    elif item.listing.labels:
+        named = ", ".join(item.listing.labels)
+        log.warning("%s: %s not read; labels are in places.lst or %s.labels", item.camera, named, name)
     files = files[part_of(files.table.times, options.begin, options.end, str(item.folder))][:: options.every]
     return Sequence(name, files, item.folder), where
 
@@ -225,7 +234,10 @@ def _below(folder: Path, camera: str | None, depth: int = 0, seen: frozenset[str
         log.warning("%s: no %s/ and no images beside it; not read", places, COLD_CAMERA)
     cameras = cameras_in_names(listing.images)
     images = cameras[choose_camera(folder, cameras, camera)] if cameras else listing.images
-    itself = [_Found(_owner(folder, images), folder, images, places, cameras=len(cameras))] if images else []
+    owner = _owner(folder, images)
+    itself = [_Found(owner, folder, images, places, cameras=len(cameras), listing=listing)] if images else []
+    if listing.unread and not images:
+        log.warning("%s: not read: %s", folder, listing.unread)
     if itself and (places or cameras or any(map(is_stamped, images))):
         if listing.recordings:
             log.warning("%s: its images are read, and not %s beside them", folder, ", ".join(listing.recordings))
@@ -272,9 +284,10 @@ def _cameras(folder: Path, folders: Iterable[str]) -> dict[str, _Found]:
 
 
 def _images_of_camera(path: Path) -> _Found | None:
-    images = list_folder(path).images if path.is_dir() else ()
     root = find_camera_root(path)
-    return _Found(root, path, images, find_places_list(root, path)) if images and root else None
+    if root is None or not path.is_dir() or not (listing := list_folder(path)).images:
+        return None
+    return _Found(root, path, listing.images, find_places_list(root, path), listing=listing)
 
 
 def _owner(folder: Path, images: tuple[str, ...]) -> Path:
@@ -285,10 +298,10 @@ def _owner(folder: Path, images: tuple[str, ...]) -> Path:
 
 
 def _camera(folder: Path, camera: Path) -> _Found:
-    images = list_folder(camera).images
-    if not images:
+    listing = list_folder(camera)
+    if not listing.images:
         raise SourceError(f"{camera}: holds no image; looked for {WANTED}")
-    return _Found(folder, camera, images, find_places_list(folder, camera))
+    return _Found(folder, camera, listing.images, find_places_list(folder, camera), listing=listing)
 
 
 def _without_aliases(found: list[_Found]) -> list[_Found]:
@@ -327,13 +340,13 @@ def _place_folders(source: Path) -> list[_Found]:
     found = []
     for name in list_folder(source).folders:
         folder = source / name
-        images = list_folder(folder).images
-        if not images:
+        listing = list_folder(folder)
+        if not listing.images:
             log.warning("%s: holds no image; not read as a place", folder)
             continue
         if reason := check_place(name):
             raise SourceError(f"{folder}: place {name!r} {reason}; rename the folder")
-        found.append(_Found(folder, folder, images, place=name))
+        found.append(_Found(folder, folder, listing.images, place=name, listing=listing))
     if not found:
         raise SourceError(f"{source}: no folder of a place there; looked for {source}/PLACE/ with {WANTED}")
     return found
@@ -384,6 +397,8 @@ def _read_list() -> tuple[tuple[Frame, ...], list[tuple[str, str]]]:
 
 def _listed_frame(number: int, text: str) -> Frame:
     path, *more = text.split("\t")
+    if not is_text(path):
+        raise SourceError(at(STDIN, number, f"the name {os.fsencode(path)!r} is not UTF-8; rename the file"))
     if len(more) > 2 or not path or "\0" in path:
         raise SourceError(at(STDIN, number, f"{text!r} is not 'path [TAB seconds [TAB place]]'"))
     seconds, place = (*more, "", "")[:2]

@@ -4,6 +4,7 @@ import logging
 import math
 import os
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,16 +27,30 @@ SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff", ".pgm", "
 RECORDINGS = (*video.SUFFIXES, *bag.SUFFIXES)
 # What devices, archivers and systems leave behind.
 _NOT_OURS = frozenset({"@eaDir", "#recycle", "$RECYCLE.BIN", "__MACOSX", "lost+found", "System Volume Information"})
+# Images that no OpenCV decodes, or only some do, or many at once.
+_UNREAD = (
+    *(".heic", ".heif", ".hif", ".avif", ".jxl", ".jp2", ".j2k", ".gif"),
+    *(".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".exr", ".psd"),
+)
+_LABELS = re.compile(r"(?i)(label|place|class|room|annotation)\w*\.(csv|tsv|txt|lst|json|ya?ml|xml|labels)")
 WANTED = "images (" + " ".join(f"*{suffix}" for suffix in SUFFIXES) + ")"
 
 
 @dataclass(frozen=True)
 class Listing:
-    """What lies directly in a folder: names of images and of videos and bags, in no order, and of folders."""
+    """What lies directly in a folder: names of images and of videos and bags, in no order, and of folders.
+
+    `labels`: files that are called as labels are; `unread`: what is said of images that are left out.
+    """
 
     images: tuple[str, ...]
     recordings: tuple[str, ...]
     folders: tuple[str, ...]
+    labels: tuple[str, ...] = ()
+    unread: str = ""
+
+
+EMPTY = Listing((), (), ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +101,12 @@ def _number_key(match: re.Match[str]) -> str:
 def list_folder(folder: Path) -> Listing:
     """The images, recordings and folders in `folder`, hidden ones left out, nothing opened; SourceError if unreadable.
 
-    Folders are in natural order.
+    Folders are in natural order. Images whose names are no text are left out: no file could name them.
     """
-    images, recordings, folders = [], [], []
+    images: list[str] = []
+    nameless: list[str] = []
+    recordings, folders, labels = [], [], []
+    unread: Counter[str] = Counter()
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
@@ -97,12 +115,33 @@ def list_folder(folder: Path) -> Listing:
                 if _is_folder(entry):
                     folders.append(entry.name)
                 elif entry.name.lower().endswith(SUFFIXES):
-                    images.append(entry.name)
+                    (images if is_text(entry.name) else nameless).append(entry.name)
+                elif entry.name.lower().endswith(_UNREAD):
+                    unread[os.path.splitext(entry.name)[1]] += 1
+                elif _LABELS.fullmatch(entry.name):
+                    labels.append(entry.name)
                 elif entry.name.lower().endswith(RECORDINGS):
                     recordings.append(entry.name)
     except OSError as error:
         raise SourceError(f"{folder}: cannot be read: {error.strerror}") from error
-    return Listing(tuple(images), tuple(recordings), tuple(sorted(folders, key=natural_key)))
+    said = []
+    if unread:
+        counted = ", ".join(f"{count} *{suffix}" for suffix, count in sorted(unread.items()))
+        said.append(f"{counted}; convert them to JPEG or PNG")
+    if nameless:
+        first = min(map(os.fsencode, nameless))
+        said.append(f"{len(nameless)} images whose names are no text, as {first!r}; rename them")
+    ordered = tuple(sorted(folders, key=natural_key))
+    return Listing(tuple(images), tuple(recordings), ordered, tuple(sorted(labels)), ", and ".join(said))
+
+
+def is_text(name: str) -> bool:
+    """Whether a file's name can stand in a line of a file of ours: UTF-8, without tabs and line ends."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return "\t" not in name and len(f"{name}.".splitlines()) == 1
 
 
 def _is_folder(entry: "os.DirEntry[str]") -> bool:

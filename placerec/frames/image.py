@@ -23,6 +23,15 @@ MAX_PIXELS = 1 << 26
 _REMEDY = "copy it again or remove it"
 _JPEG = b"\xff\xd8\xff"
 _PNG = b"\x89PNG\r\n\x1a\n"
+# What is whole, and no image that OpenCV decodes.
+_OTHERS = {
+    "AVIF": re.compile(rb"....ftypavi[fs]", re.DOTALL),
+    "HEIC": re.compile(rb"....ftyp(hei|hev|mif1|msf1)", re.DOTALL),
+    "a video": re.compile(rb"....ftyp", re.DOTALL),
+    "JPEG XL": re.compile(rb"\xff\n|\0\0\0\x0cJXL "),
+    "GIF": re.compile(rb"GIF8"),
+    "PDF": re.compile(rb"%PDF"),
+}
 # Within a scan FF is followed by 00 (a stuffed byte), D0-D7 (a restart) or FF (filling); anything else ends it.
 _SCAN_END = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
 # C4, C8 and CC are tables and extensions.
@@ -93,7 +102,13 @@ def _decode(name: str, data: bytes) -> NDArray[Any]:
     except cv2.error as error:
         raise SourceError(f"{name}: OpenCV refuses it ({' '.join(error.err.split())}); {_REMEDY}") from error
     if pixels is None:
-        raise SourceError(f"{name}: is no image that OpenCV can decode; {_REMEDY}")
+        kind = next((kind for kind, pattern in _OTHERS.items() if pattern.match(data)), "")
+        what = (
+            f"is {kind}, which is not read; convert it to JPEG"
+            if kind
+            else f"is no image that OpenCV can decode; {_REMEDY}"
+        )
+        raise SourceError(f"{name}: {what}")
     return pixels
 
 

@@ -2,6 +2,7 @@
 
 import math
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -244,3 +245,48 @@ def test_sources_that_are_none(tmp_path: Path) -> None:
 def test_too_deep(tmp_path: Path) -> None:
     make(tmp_path, "1/2/3/4/5/6/std_cam/t1.000000.jpeg", "a/2/3/4/5/6/7/std_cam/t1.000000.jpeg")
     assert [sequence.name for sequence in find_sequences([tmp_path])] == ["6"]
+
+
+def test_images_that_are_not_read_are_counted_once_a_folder(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    make(tmp_path / "phone", *(f"{i}.jpg" for i in range(8)), *(f"{i}.HEIC" for i in range(8, 12)), "a.gif")
+    make(tmp_path / "cold/std_cam", "t1.5.jpeg", "t2.5.avif")
+    make(tmp_path / "raw", "1.dng", "2.dng")
+    make(tmp_path / "tum/rgb", "1.png", "2.jp2")
+    make(tmp_path / "tum/depth", "1.png")
+    remedy = "convert them to JPEG or PNG"
+    find_sequences([tmp_path])
+    assert caplog.messages == [
+        f"{tmp_path / 'raw'}: not read: 2 *.dng; {remedy}",
+        f"{tmp_path / 'cold/std_cam'}: not read: 1 *.avif; {remedy}",
+        f"{tmp_path / 'phone'}: not read: 4 *.HEIC, 1 *.gif; {remedy}",
+        f"{tmp_path / 'tum/rgb'}: not read: 1 *.jp2; {remedy}",
+    ]
+    caplog.clear()
+    make(tmp_path / "home", "kitchen/1.jpg", "kitchen/2.heic", "office/1.jpg")
+    find_sequences([tmp_path / "home"])
+    assert caplog.messages[1:] == [f"{tmp_path / 'home/kitchen'}: not read: 1 *.heic; {remedy}"]
+
+
+def test_labels_that_are_not_read_are_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    make(tmp_path / "run", "1.png", "labels.csv", "Places_2.json", "notes.txt", "groundtruth.txt")
+    find_sequences([tmp_path / "run"])
+    said = f"{tmp_path / 'run'}: Places_2.json, labels.csv not read; labels are in places.lst or run.labels"
+    assert caplog.messages == [said]
+    caplog.clear()
+    labelled(tmp_path / "run/places.lst", "1.png hall\n")
+    find_sequences([tmp_path / "run"])
+    assert caplog.messages == []
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="there names are text")
+def test_names_that_are_no_text_are_skipped_and_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    make(tmp_path / "run", "1.jpg", "a\nb.jpg", "a\tb.jpg", "e\u0301 \u200d.jpg")
+    for name in (b"3\xff.jpg", b"4\xff.jpg"):
+        (tmp_path / os.fsdecode(b"run/" + name)).touch()
+    (sequence,) = find_sequences([tmp_path / "run"])
+    assert [frame.name for frame in sequence.frames] == ["1.jpg", "e\u0301 \u200d.jpg"]
+    assert caplog.messages == [
+        rf"{tmp_path / 'run'}: not read: 4 images whose names are no text, as b'3\xff.jpg'; rename them"
+    ]
+    make(tmp_path, "two\nlines/1.jpg")
+    assert failure(tmp_path / "two\nlines").endswith("its name is not UTF-8, or holds a tab or a line end; rename it")

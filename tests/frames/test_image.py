@@ -307,3 +307,20 @@ def test_the_log_level_is_restored_by_the_last_of_many_threads(tmp_path: Path) -
 def test_finding_sequences_does_not_import_opencv() -> None:
     code = "import sys, placerec.frames; sys.exit('cv2' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "HEIC"),
+        (b"\0\0\0\x1cftypmif1\0\0\0\0", "HEIC"),
+        (b"\0\0\0\x18ftypmp42\0\0\0\0", "a video"),
+        (b"\xff\n\xfa\x1f", "JPEG XL"),
+        (b"%PDF-1.7 ", "PDF"),
+    ],
+)
+def test_what_is_whole_and_of_another_kind_is_to_be_converted(tmp_path: Path, data: bytes, kind: str) -> None:
+    path = write(tmp_path / "a.jpg", data + bytes(64))
+    with pytest.raises(SourceError) as error:
+        read_gray(path)
+    assert str(error.value) == f"{path}: is {kind}, which is not read; convert it to JPEG"

@@ -42,9 +42,11 @@ def test_seconds_and_places(given: Listed) -> None:
     assert [(math.isnan(frame.time), frame.place) for frame in untimed.frames] == [(True, "hall"), (True, "")]
 
 
-def test_names_need_not_be_utf8(given: Listed) -> None:
-    (frame,) = given(b"k\xfcche.png\n").frames
-    assert bytes(frame.path) == b"k\xfcche.png"
+def test_a_name_that_is_not_utf8_is_refused_before_the_work(given: Listed) -> None:
+    """No file of ours could name it."""
+    with pytest.raises(SourceError) as error:
+        given(b"a.png\nk\xfcche.png\n")
+    assert str(error.value) == r"<stdin>:2: the name b'k\xfcche.png' is not UTF-8; rename the file"
 
 
 @pytest.mark.parametrize(
