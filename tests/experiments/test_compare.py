@@ -17,7 +17,7 @@ from placerec.errors import EvaluationError, MissingExtraError, OutputError, Pla
 from placerec.experiments import store
 from placerec.experiments.comparison import benchmark
 from placerec.experiments.comparison.benchmark import COMPARED, Benchmark, ComparedMethod, MethodRun
-from placerec.experiments.comparison.results import Comparison
+from placerec.experiments.comparison.results import Comparison, format_comparison
 from placerec.experiments.comparison.run import compare
 from placerec.figures.evaluation import evaluate_files
 from placerec.vision import Dictionary
@@ -86,6 +86,15 @@ def test_every_method_has_a_line_with_what_evaluate_says(done: tuple[Path, Compa
         assert sorted(path.name for path in (out / "beliefs" / name).glob("*.tsv")) == ["run3.tsv", "run4.tsv"]
     assert all(float(row["accuracy"]) > 0.8 for name, row in table.items() if name != "majority")
     assert float(table["majority"]["accuracy"]) == found.majority == 0.5
+
+
+def test_the_table_for_a_terminal_is_straight(done: tuple[Path, Comparison]) -> None:
+    *lines, last = format_comparison(done[1]).splitlines()
+    assert len({len(line) for line in lines}) == 1
+    assert [line.split()[0] for line in lines[1:]] == [
+        score.method for score in sorted(done[1].scores, key=lambda score: -score.accuracy)
+    ]
+    assert last.startswith("24 frames; always 'hall'")
 
 
 def test_every_two_methods_have_a_verdict(done: tuple[Path, Comparison]) -> None:

@@ -108,16 +108,17 @@ def format_pairs(pairs: Sequence[Pair]) -> str:
 
 def format_comparison(found: Comparison) -> str:
     """A table for a terminal, best first, without a line end at its end."""
+    width = max(16, *(len(score.method) + 1 for score in found.scores))
     lines = [
-        f"{'method':<16}{'accuracy':>9}  {'95 % interval':>15}{'balanced':>10}{'latency':>9}{'ECE':>7}"
+        f"{'method':<{width}}{'accuracy':>9}  {'95 % interval':>15}{'balanced':>10}{'latency':>9}{'ECE':>7}"
         f"{'log loss':>10}{'us/frame':>10}"
     ]
     for s in sorted(found.scores, key=lambda score: -score.accuracy):
         latency = "-" if s.change_latency_frames is None else f"{s.change_latency_frames:g}"
         lines.append(
-            f"{s.method:<16}{100 * s.accuracy:>7.1f} %  {100 * s.accuracy_low:>6.1f} - {100 * s.accuracy_high:>4.1f} %"
-            f"{100 * s.balanced_accuracy:>8.1f} %{latency:>9}{s.ece:>7.3f}"
-            f"{s.log_loss:>10.3f}{s.microseconds_per_frame:>10.1f}"
+            f"{s.method:<{width}}{100 * s.accuracy:>7.1f} %"
+            f"  {100 * s.accuracy_low:>6.1f} - {100 * s.accuracy_high:>4.1f} %{100 * s.balanced_accuracy:>8.1f} %"
+            f"{latency:>9}{s.ece:>7.3f}{s.log_loss:>10.3f}{s.microseconds_per_frame:>10.1f}"
         )
     lines.append(f"{found.frames} frames; always {found.majority_place!r}: {100 * found.majority:.1f} %")
     return "\n".join(lines)
