@@ -30,7 +30,7 @@ def write_count_model(
     for i in range(options["em-iters"]):
         expected = _expected(model, samples)
         streams.say(f"iteration {i}: log likelihood = {expected.log10_p:g}")
-        if i and abs((expected.log10_p - before) / expected.log10_p) < options["em-delta"]:
+        if i and abs(expected.log10_p - before) < options["em-delta"] * abs(expected.log10_p):
             break
         before = expected.log10_p
         _tell(expected, options["debug"], streams)
