@@ -195,9 +195,9 @@ def inspect(path: Path, asked: tuple[str, ...], top: int, as_json: bool, out: Pa
     """Read a model, or one decision of `decode --explain`.
 
     Of a model: counts, top n-grams, sums, p(w | h). NGRAM is some words in quotes: the probability of the last one
-    after the others is shown step by step. Of the decision at FRAME (its name, or the beginning of it): what each
-    place's model said of the word, what that made of the belief, and which of the last words speak for the best place
-    and against it.
+    after the others is shown step by step, and which words are most probable after all of them. Of the decision at
+    FRAME (its name, or the beginning of it): what each place's model said of the word, what that made of the belief,
+    and which of the last words speak for the best place and against it.
     """
     if path.name.endswith(".jsonl"):
         found, text = _decision(path, asked, out)
@@ -229,7 +229,8 @@ def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[obj
 def check(models: tuple[Path, ...], as_json: bool) -> None:
     """Check that a model sums to 1 and agrees with KenLM.
 
-    The probabilities after every context must sum to 1, and KenLM must give every token the same one.
+    The probabilities after every context must sum to 1, and KenLM must give every token the same one. A file that SRILM
+    reads and KenLM refuses is compared through a copy, and what KenLM refuses is said.
     """
     from placerec.lm.check import check_model
 

@@ -6,8 +6,8 @@ Grammar (one blank between words, tabs elsewhere; numbers are log10, `%.7g`)::
     section  = NL "\" n "-grams:" NL { log10-p TAB word { " " word } [ TAB log10-backoff ] NL }
 
 The writer's layout and order of lines are SRILM's (section 7 of our specification). The reader is as strict as
-KenLM's, so that a file that passes here passes there; orders that KenLM does not do are read as well. -99 stands for
-log 0.
+KenLM's, so that a file that passes here passes there; orders that KenLM does not do are read as well. What is refused
+here is read by `arpa_tolerant` if SRILM reads it. -99 stands for log 0.
 """
 
 import logging
@@ -144,13 +144,38 @@ def with_unigrams(model: BackoffModel, words: Sequence[str]) -> BackoffModel:
     )
 
 
-def read_arpa(path: Path | str) -> BackoffModel:
+def read_arpa(path: Path | str, *, tolerant: bool = True) -> BackoffModel:
     """Read an ARPA file (gzipped if the name ends in .gz).
 
-    Raises LanguageModelError, naming the file, the line, the value and what is expected, for whatever KenLM would
-    refuse: wrong counts, positive or missing numbers, words or contexts that are not listed, a missing end.
+    What SRILM's `ngram` reads though KenLM refuses it (blanks for tabs, text around the model, other counts than
+    promised) is read with a warning that says what KenLM refuses; unless `tolerant`, it raises. LanguageModelError
+    names the file, the line, the value and what is expected.
     """
-    return _Reader(path).model()
+    model, complaint = read_with_complaint(path)
+    if complaint:
+        if not tolerant:
+            raise LanguageModelError(complaint)
+        log.warning("%s (KenLM would refuse the file)", complaint)
+    return model
+
+
+def read_with_complaint(path: Path | str) -> tuple[BackoffModel, str]:
+    """The model in an ARPA file, and the first thing in it that KenLM would refuse, with the place; empty if nothing.
+
+    Raises LanguageModelError for what `ngram` refuses, too.
+    """
+    try:
+        return _Reader(path).model(), ""
+    except LanguageModelError as strict:
+        # Rarely needed.
+        from placerec.lm.arpa_tolerant import read_tolerantly
+
+        try:
+            return read_tolerantly(path), str(strict)
+        except LanguageModelError as error:
+            # One line that both refuse is refused in the strict words.
+            same = str(error).split(": ")[0] == str(strict).split(": ")[0]
+            raise (strict if same else error) from None
 
 
 class _Reader:
@@ -177,7 +202,7 @@ class _Reader:
                 key = vocabulary.ids([word for (word,) in words])
             else:
                 model, key = self.keys(model, words, first)
-            model = _with_order(model, key, log10_p, backoff)
+            model = with_order(model, key, log10_p, backoff)
             if len(model.trie.keys[-1]) < size:
                 twice = size - len(model.trie.keys[-1])
                 log.warning("%s: %d of the %d-grams are listed twice; the first of each counts", self.path, twice, n)
@@ -236,14 +261,10 @@ class _Reader:
                 raise self.error(f"backoff weight {parts[-1]} on the highest order, which has none", line)
         # KenLM takes both spellings for the unknown word.
         words = ["<unk>" if word == "<UNK>" else word for word in parts[1 : n + 1]]
-        return _zero(log10_p), words, np.nan if top else _zero(weight)
+        return log_zero(log10_p), words, np.nan if top else log_zero(weight)
 
     def number(self, text: str, line: int, what: str) -> float:
-        try:
-            # Python also takes 1_0, digits of other scripts, and blanks around them.
-            value = float(text) if _NUMBER.fullmatch(text) else np.nan
-        except ValueError:
-            value = np.nan
+        value = log10_number(text)
         if np.isnan(value):
             raise self.error(f"{what} {text[:60]!r} is not a number", line)
         return value
@@ -257,7 +278,7 @@ class _Reader:
         for i in np.flatnonzero((numbers < 0).any(axis=1))[:1].tolist():
             word = words[i][int(np.argmin(numbers[i]))]
             raise self.error(f"the word {word!r} is not among the 1-grams", first + i)
-        row = _rows(model.trie, numbers[:, :-1])
+        row = rows_of(model.trie, numbers[:, :-1])
         lacking = np.flatnonzero(row < 0)
         if len(lacking):
             # KenLM takes a missing context for granted where another n-gram ends in it.
@@ -268,18 +289,18 @@ class _Reader:
                         f"the context {' '.join(words[i][:-1])!r} is not among the {n - 1}-grams", first + i
                     )
             model = self.with_contexts(model, np.unique(numbers[lacking, :-1], axis=0), first + int(lacking[0]))
-            row = _rows(model.trie, numbers[:, :-1])
+            row = rows_of(model.trie, numbers[:, :-1])
         return model, row * len(vocabulary) + numbers[:, -1]
 
     def with_contexts(self, model: BackoffModel, numbers: Ints, line: int) -> BackoffModel:
         """`model` with n-grams (m, N) of the highest order N added, each with the log10 p that back-off gives it."""
-        prefix = _rows(model.trie, numbers[:, :-1])
+        prefix = rows_of(model.trie, numbers[:, :-1])
         if (prefix < 0).any():
             raise self.error("the context of an n-gram is missing at two orders", line)
         trie = model.trie
         log10_p = np.array([model.tables.score(ngram)[-1] for ngram in numbers], np.float32)
         shorter = BackoffModel(Trie(trie.vocabulary, trie.keys[:-1]), model.log10_probs[:-1], model.backoffs[:-1])
-        return _with_order(
+        return with_order(
             shorter,
             np.concatenate([trie.keys[-1], prefix * len(trie.vocabulary) + numbers[:, -1]]),
             np.concatenate([model.log10_probs[-1], log10_p]),
@@ -307,11 +328,21 @@ class _Reader:
         return self.lines[self.line - 1]
 
 
-def _zero(value: float) -> float:
+def log10_number(text: str) -> float:
+    """The number that a text is, nan for what is none."""
+    try:
+        # Python also takes 1_0, digits of other scripts, and blanks around them.
+        return float(text) if _NUMBER.fullmatch(text) else np.nan
+    except ValueError:
+        return np.nan
+
+
+def log_zero(value: float) -> float:
+    """A log10 number of a file, -inf for -99 and less."""
     return -np.inf if value <= LOG_ZERO else value
 
 
-def _rows(trie: Trie, numbers: Ints) -> Ints:
+def rows_of(trie: Trie, numbers: Ints) -> Ints:
     """Rows (m,) of the n-grams whose word numbers are the rows of `numbers` (m, n), -1 where not listed."""
     row = numbers[:, 0]
     for n in range(2, numbers.shape[1] + 1):
@@ -319,7 +350,7 @@ def _rows(trie: Trie, numbers: Ints) -> Ints:
     return row
 
 
-def _with_order(model: BackoffModel, key: Ints, log10_p: Singles, backoff: Singles) -> BackoffModel:
+def with_order(model: BackoffModel, key: Ints, log10_p: Singles, backoff: Singles) -> BackoffModel:
     """`model` with one order more, given in any order; of duplicates the first counts, as in KenLM."""
     distinct, rows = np.unique(key, return_index=True)
     return BackoffModel(

@@ -37,6 +37,11 @@ class BackoffModel:
         return self.trie.order
 
     @property
+    def listed_order(self) -> int:
+        """The highest order of which there are n-grams, at least 1; a header may promise none of higher ones."""
+        return max([n for n, keys in enumerate(self.trie.keys, start=1) if len(keys)], default=1)
+
+    @property
     def words(self) -> tuple[str, ...]:
         """All listed words, `<s>`, `</s>` and `<unk>` among them."""
         return self.trie.vocabulary.words
@@ -60,6 +65,22 @@ class BackoffModel:
         """
         refuse_string(words, LanguageModelError)
         return self.tables.score(self.ids(words))
+
+    def next_words(self, history: Sequence[str] = (), k: int = 10) -> list[tuple[str, float]]:
+        """The k words that are most probable after `history`, and their log10 p, the most probable first.
+
+        Equals stand in the order of their code points; `<s>` and words of probability 0 are left out. Words of the
+        history are looked up as `log10_p` does. Raises LanguageModelError if k is negative.
+        """
+        refuse_string(history, LanguageModelError)
+        if k < 0:
+            raise LanguageModelError(f"k={k}: a number of words is needed, 0 or more")
+        recent = list(history)[-(self.order - 1) :] if self.order > 1 else []
+        digits = self.tables.digits(np.append(self.ids(recent), 0))
+        log10_p = self.tables.distribution(Contexts(self.tables, digits, 0), len(recent))
+        log10_p[self.trie.vocabulary.mask([SENTENCE_START])] = -np.inf
+        best = np.argsort(-log10_p, kind="stable")[:k]
+        return [(self.words[number], float(log10_p[number])) for number in best.tolist() if log10_p[number] > -np.inf]
 
     def perplexity(self, sentences: Iterable[Sequence[str]]) -> "Totals":
         """What the model makes of sentences of words: `sentences, words, oovs, zeroprobs, log10_p, ppl, ppl1`.

@@ -7,18 +7,18 @@ import math
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask
 from placerec.errors import LanguageModelError, check_optional
-from placerec.files import read_text
-from placerec.lm.arpa import read_arpa
+from placerec.lm.arpa import read_with_complaint, with_unigrams, write_arpa
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.logs import ABOUT_LOG_ZERO
-from placerec.lm.trie import per_context
+from placerec.lm.trie import Trie, per_context
+from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
 
 # Half a unit of the seventh digit for each of the terms that a context's sum is made of.
 SUM_TOLERANCE = 1e-5
@@ -27,6 +27,7 @@ AGREEMENT_TOLERANCE = 2e-6
 _LARGEST_POWER = 308
 KENLM_MAX_ORDER = 6
 KENLM_PURPOSE = "scoring with KenLM"
+_REASON = re.compile(r" threw [\w:]+(?: because `.*?')?\. (.*?)(?: Byte: \d+)?\)$", re.DOTALL)
 Scorer = Callable[[Sequence[str]], Floats]
 
 
@@ -41,7 +42,8 @@ class ModelCheck:
     highest_sum: float
     worst_context: str
     tokens: int
-    largest_difference: float | None  # None: KenLM does not do this order
+    largest_difference: float | None  # None: KenLM does not do this order, or does not load any copy of the model
+    refused: str = ""  # what KenLM refuses in the file, with the place
 
     @property
     def ok(self) -> bool:
@@ -52,10 +54,12 @@ class ModelCheck:
     def sentence(self) -> str:
         """The check in a line for people."""
         sums = f"{self.contexts} contexts sum to {self.lowest_sum:.7f} .. {self.highest_sum:.7f}"
-        if self.largest_difference is None:
-            scores = f"KenLM does no order above {KENLM_MAX_ORDER}, not compared"
-        else:
+        if self.largest_difference is not None:
             scores = f"KenLM agrees on {self.tokens} tokens, largest difference {self.largest_difference:.1e}"
+        else:
+            scores = "not compared" if self.refused else f"KenLM does no order above {KENLM_MAX_ORDER}, not compared"
+        if self.refused:
+            scores = f"KenLM refuses it ({self.refused}), SRILM reads it; {scores}"
         verdict = "ok" if self.ok else f"FAIL (worst context: {self.worst_context})"
         return f"{self.path}: order {self.order}: {sums}; {scores}: {verdict}"
 
@@ -108,7 +112,7 @@ def generated_stream(model: BackoffModel, length: int, seed: int = 0) -> list[st
     plain = [word for word in model.words if word not in ("<s>", "</s>", "<unk>")]
     if not plain:
         raise LanguageModelError("the model lists no word but its markers; there is nothing to score")
-    texts = model.trie.texts(model.order)
+    texts = model.trie.texts(model.listed_order)
     listed = [text for text in texts if not {"<s>", "</s>", "<unk>"} & set(text.split(" "))]
     words: list[str] = []
     while len(words) < length:
@@ -122,11 +126,12 @@ def generated_stream(model: BackoffModel, length: int, seed: int = 0) -> list[st
 def check_model(path: Path | str, *, tokens: int = 2000, seed: int = 0) -> ModelCheck:
     """Check one ARPA file: the sum of every context, and KenLM's log10 p of every token of a generated stream.
 
-    Orders above 6 are not compared (KenLM's limit); order 1, which KenLM refuses, is compared through a padded copy.
-    Raises LanguageModelError for an unreadable file, MissingExtraError without KenLM.
+    Orders above 6 are not compared (KenLM's limit); what KenLM refuses though SRILM reads it, order 1 for one, is
+    compared through a copy that KenLM loads, if there can be one. Raises LanguageModelError for an unreadable file,
+    MissingExtraError without KenLM.
     """
-    model = read_arpa(path)
-    if model.order <= KENLM_MAX_ORDER:
+    model, refused = read_with_complaint(path)
+    if model.listed_order <= KENLM_MAX_ORDER:
         check_optional("kenlm", KENLM_PURPOSE)
     sums, names = [], []
     for n, rows, totals in context_sums(model):
@@ -137,26 +142,32 @@ def check_model(path: Path | str, *, tokens: int = 2000, seed: int = 0) -> Model
     every = np.concatenate(sums)
     words = generated_stream(model, tokens, seed)
     difference = None
-    if model.order <= KENLM_MAX_ORDER:
-        ours, theirs = model.score(words), kenlm_scorer(path)(words)
-        nowhere = (ours < ABOUT_LOG_ZERO) & (theirs < ABOUT_LOG_ZERO)
-        difference = float(np.abs(np.where(nowhere, 0.0, ours) - np.where(nowhere, 0.0, theirs)).max(initial=0.0))
+    refused = refused or _missing_marker(path, model)
+    if model.listed_order <= KENLM_MAX_ORDER:
+        try:
+            ours, theirs = model.score(words), kenlm_scorer(path)(words)
+        except LanguageModelError as error:
+            refused = refused or str(error)
+        else:
+            nowhere = (ours < ABOUT_LOG_ZERO) & (theirs < ABOUT_LOG_ZERO)
+            difference = float(np.abs(np.where(nowhere, 0.0, ours) - np.where(nowhere, 0.0, theirs)).max(initial=0.0))
     return ModelCheck(
         path=str(path),
-        order=model.order,
+        order=model.listed_order,
         contexts=len(every),
         lowest_sum=float(every.min()),
         highest_sum=float(every.max()),
         worst_context=max(names, key=lambda name: abs(name[0] - 1))[1],
         tokens=len(words) if difference is not None else 0,
         largest_difference=difference,
+        refused=refused,
     )
 
 
 def kenlm_scorer(path: Path | str) -> Scorer:
     """A function that gives KenLM's log10 p float64 (T,) of T words: empty first context, no markers.
 
-    Order 1, which KenLM refuses, is loaded through a temporary copy that is padded with one bigram. Raises
+    What KenLM refuses though it could do the model, order 1 for one, is loaded through a temporary copy. Raises
     MissingExtraError if KenLM is not installed, LanguageModelError for a file that it cannot load.
     """
     check_optional("kenlm", KENLM_PURPOSE)
@@ -165,20 +176,24 @@ def kenlm_scorer(path: Path | str) -> Scorer:
     config = kenlm.Config()
     config.show_progress = False
     config.arpa_complain = kenlm.ARPALoadComplain.NONE
-    order = read_arpa(path).order
+    read, refused = read_with_complaint(path)
+    order = read.listed_order
     if order > KENLM_MAX_ORDER:
         raise LanguageModelError(
             f"{path}: order {order}; KenLM scores orders up to {KENLM_MAX_ORDER}; use the native scorer"
         )
     with tempfile.TemporaryDirectory() as folder:
         loadable = Path(path)
-        if order == 1:
-            loadable = Path(folder) / "padded.arpa"
-            loadable.write_text(_padded(read_text(Path(path), LanguageModelError)), encoding="utf-8")
+        if order == 1 or refused or read.order > KENLM_MAX_ORDER or _missing_marker(path, read):
+            loadable = Path(folder) / "copy.arpa"
+            write_arpa(_loadable(read), loadable)
         try:
             model = kenlm.Model(str(loadable), config)
         except OSError as error:
-            raise LanguageModelError(f"{path}: KenLM cannot load it: {str(error).splitlines()[0]}") from error
+            # Its message names the file that it was given, and the lines of its sources.
+            match = _REASON.search(str(error))
+            reason = (match[1] if match else str(error).splitlines()[0]).strip()
+            raise LanguageModelError(f"{path}: KenLM cannot load it: {reason}") from error
 
     def score(words: Sequence[str]) -> Floats:
         return np.array([p for p, _, _ in model.full_scores(" ".join(words), bos=False, eos=False)], np.float64)
@@ -186,8 +201,27 @@ def kenlm_scorer(path: Path | str) -> Scorer:
     return score
 
 
-def _padded(text: str) -> str:
-    """A unigram ARPA text with a bigram that no stream without markers ever asks for."""
-    text = re.sub(r"^(ngram\s+1\s*=.*)$", r"\1\nngram 2=1", text, count=1, flags=re.MULTILINE)
-    head, _, _ = text.partition("\\end\\")
-    return f"{head}\\2-grams:\n-99\t<s> </s>\n\n\\end\\\n"
+def _missing_marker(path: Path | str, model: BackoffModel) -> str:
+    """What KenLM says of a model that lacks <s> or </s>, an empty text if there are both."""
+    missing = [marker for marker in (SENTENCE_START, SENTENCE_END) if marker not in model]
+    return f"{path}: {missing[0]} is not among the 1-grams" if missing else ""
+
+
+def _loadable(model: BackoffModel) -> BackoffModel:
+    """The model with KenLM's words, without orders that KenLM does not do, and of order 2 at least."""
+    order = min(model.order, KENLM_MAX_ORDER)
+    trie = Trie(model.trie.vocabulary, model.trie.keys[:order])
+    model = BackoffModel(trie, model.log10_probs[:order], model.backoffs[:order])
+    model = with_unigrams(model, [word for word in (SENTENCE_START, SENTENCE_END, UNKNOWN) if word not in model])
+    backoffs = list(model.backoffs)
+    if order > 1:
+        backoffs[-1] = np.full(len(backoffs[-1]), np.nan, np.float32)
+        return replace(model, backoffs=tuple(backoffs))
+    index = model.trie.vocabulary.index
+    bigram = np.array([index[SENTENCE_START] * len(model.trie.vocabulary) + index[SENTENCE_END]])
+    weight = np.where(np.isnan(backoffs[0]), np.float32(0), backoffs[0])
+    return BackoffModel(
+        Trie(model.trie.vocabulary, (model.trie.keys[0], bigram)),
+        (model.log10_probs[0], np.full(1, -np.inf, np.float32)),
+        (weight, np.full(1, np.nan, np.float32)),
+    )

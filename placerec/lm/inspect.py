@@ -9,7 +9,7 @@ import numpy as np
 
 from placerec.errors import LanguageModelError, refuse_string
 from placerec.files import read_text
-from placerec.lm.arpa import read_arpa
+from placerec.lm.arpa import read_with_complaint
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.check import context_sums, power_of_ten
 from placerec.lm.score import Contexts
@@ -20,25 +20,29 @@ def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5)
     """What an ARPA file holds, as plain data.
 
     `ngrams_per_order`; `contexts` and their lowest and highest sum; per order the `top` n-grams by joint probability
-    (how often the model expects them); for each of `ngrams` (words joined by blanks) its p, step by step. Raises
-    LanguageModelError for a file that is not ARPA or a word that it does not list.
+    (how often the model expects them); for each of `ngrams` (words joined by blanks) its p, step by step, and the `top`
+    words most probable after it. `refused_by_kenlm`: what KenLM refuses though SRILM reads it, empty if nothing. Orders
+    without n-grams above all others do not count. Raises LanguageModelError for a file that is not ARPA or a word that
+    it does not list.
     """
-    model = read_arpa(path)
+    model, refused = read_with_complaint(path)
+    orders = range(1, model.listed_order + 1)
     sums = np.concatenate([totals for _, _, totals in context_sums(model)])
     comment = read_text(Path(path), LanguageModelError).partition("\n")[0]
     try:
-        explained = [explain(model, ngram.split()) for ngram in ngrams]
+        explained = [explain(model, ngram.split(), top=top) for ngram in ngrams]
     except LanguageModelError as error:
         raise LanguageModelError(f"{path}: {error}") from error
     return {
         "path": str(path),
         "comment": comment if comment.startswith("#") else "",
-        "order": model.order,
-        "ngrams_per_order": [len(keys) for keys in model.trie.keys],
+        "refused_by_kenlm": refused,
+        "order": model.listed_order,
+        "ngrams_per_order": [len(model.trie.keys[n - 1]) for n in orders],
         "contexts": len(sums),
         "lowest_sum": float(sums.min()),
         "highest_sum": float(sums.max()),
-        "most_frequent": [most_frequent(model, n, top) for n in range(1, model.order + 1)],
+        "most_frequent": [most_frequent(model, n, top) for n in orders],
         "explained": explained,
     }
 
@@ -57,8 +61,11 @@ def most_frequent(model: BackoffModel, n: int, top: int) -> list[dict[str, Any]]
     return [{"ngram": texts[row], "p": _finite(10 ** float(joint[row]))} for row in first.tolist()]
 
 
-def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:
-    """How the model arrives at p(last word | words before): the contexts it tried, the weights paid, what answered."""
+def explain(model: BackoffModel, words: Sequence[str], *, top: int = 0) -> dict[str, Any]:
+    """How the model arrives at p(last word | words before): the contexts it tried, the weights paid, what answered.
+
+    `next`: the `top` words that are most probable after all of them.
+    """
     refuse_string(words, LanguageModelError)
     if not words:
         raise LanguageModelError("an n-gram to explain holds no word")
@@ -89,7 +96,15 @@ def explain(model: BackoffModel, words: Sequence[str]) -> dict[str, Any]:
     ngram = " ".join([*history, word][-found:])
     steps.append({"ngram": ngram, "found": True, "log10_p": _finite(listed)})
     total = float(log10_p[-1])
-    return {"word": word, "history": history, "log10_p": _finite(total), "p": power_of_ten(total), "steps": steps}
+    following = [{"word": after, "p": power_of_ten(p)} for after, p in model.next_words(words, top)]
+    return {
+        "word": word,
+        "history": history,
+        "log10_p": _finite(total),
+        "p": power_of_ten(total),
+        "steps": steps,
+        "next": following,
+    }
 
 
 def format_inspection(found: dict[str, Any]) -> str:
@@ -97,6 +112,8 @@ def format_inspection(found: dict[str, Any]) -> str:
     lines = [f"{found['path']}: order {found['order']}"]
     if found["comment"]:
         lines.append(found["comment"])
+    if found["refused_by_kenlm"]:
+        lines.append(f"KenLM refuses it: {found['refused_by_kenlm']}")
     lines.append(
         "n-grams  " + ", ".join(f"{count} of order {n}" for n, count in enumerate(found["ngrams_per_order"], 1))
     )
@@ -127,6 +144,10 @@ def _explanation(explained: dict[str, Any]) -> list[str]:
         else:
             lines.append(f"  {step['ngram']!r} is not listed, nor is its context {step['context']!r}: nothing to pay")
     lines.append(f"  log10 p = {' + '.join(terms)} = {_show(explained['log10_p'])}, p = {explained['p']:.7g}")
+    if explained["next"]:
+        context = " ".join([*explained["history"], explained["word"]])
+        lines.append(f"most probable after {context!r}")
+        lines += [f"  {entry['p']:<12.6g} {entry['word']}" for entry in explained["next"]]
     return lines
 
 

@@ -212,7 +212,7 @@ def _load(folder: ModelFolder) -> PlaceModels:
         arpa = folder.place(place).arpa
         if not arpa.exists():
             raise ModelError(f"{arpa}: missing, though {MODEL_JSON} lists the place {place!r}; {_RETRAIN}")
-        models[place] = read_arpa(arpa)
+        models[place] = read_arpa(arpa, tolerant=False)
     return PlaceModels(folder, models, description)
 
 

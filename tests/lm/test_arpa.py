@@ -1,6 +1,7 @@
 """ARPA files: what is written is read back, and what KenLM refuses is refused with its place."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,7 @@ def test_reader_is_as_strict_as_kenlm(shared: Path) -> None:
     for case in cases:
         path = shared / "arpa" / case["file"]
         if case["kenlm"]["loads"] or case["file"] in KENLM_ONLY:
-            model = read_arpa(path)
+            model = read_arpa(path, tolerant=False)
             scores = case["kenlm"].get('full_scores of "a b a zzz" with <s> and </s>: log10 p, order, oov')
             if scores and "duplicate" not in case["file"]:
                 # KenLM starts from <s>, so the first words are compared with that history.
@@ -76,7 +77,7 @@ def test_reader_is_as_strict_as_kenlm(shared: Path) -> None:
                 assert np.maximum(theirs, -100) == pytest.approx(ours, abs=2e-6), path.name
         else:
             with pytest.raises(LanguageModelError, match=path.name):
-                read_arpa(path)
+                read_arpa(path, tolerant=False)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +107,7 @@ def test_errors_name_line_and_value(old: str, new: str, message: str, tmp_path: 
     assert old in GOOD
     path.write_text(GOOD.replace(old, new, 1))
     with pytest.raises(LanguageModelError) as error:
-        read_arpa(path)
+        read_arpa(path, tolerant=False)
     assert str(error.value) == f"{path}{message}"
 
 
@@ -117,7 +118,55 @@ def test_a_missing_context_is_named(tmp_path: Path) -> None:
     )
     path.write_text(text)
     with pytest.raises(LanguageModelError, match=r":15: the context 'b a' is not among the 2-grams$"):
-        read_arpa(path)
+        read_arpa(path, tolerant=False)
+
+
+# No model can be made of nan.
+NOT_A_NUMBER = {"prob-nan.arpa", "backoff-nan.arpa"}
+
+
+def test_what_ngram_reads_is_read_and_scored_alike_and_kenlm_is_told_of(
+    shared: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    cases = [json.loads(line) for line in (shared / "arpa/expected.jsonl").read_text().splitlines()]
+    read = 0
+    for case in cases:
+        path = shared / "arpa" / case["file"]
+        if case["srilm"]["exit"] or case["file"] in NOT_A_NUMBER:
+            with pytest.raises(LanguageModelError, match=path.name):
+                read_arpa(path)
+            continue
+        caplog.clear()
+        model = read_arpa(path)
+        read += 1
+        told = any("KenLM would refuse the file" in record.message for record in caplog.records)
+        assert told == (not case["kenlm"]["loads"] and case["file"] not in KENLM_ONLY), path.name
+        scores = re.search(r"logprob= (\S+)", case["srilm"]["stdout"][1])
+        if scores and told:
+            assert model.perplexity([["a", "b", "a", "zzz"]]).log10_p == pytest.approx(float(scores[1])), path.name
+    assert read > 55
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("\\data\\", "made by hand\n\\data\\"),
+        ("-0.5\ta\t-0.2", "  -0.5   a -0.2 "),
+        ("a b\n", "a b\n\n## more\n"),
+        ("ngram 1=3", "ngram  1=99"),
+        ("\\end\\\n", "\\end\\\nthat was it\n"),
+        ("a b\n", "a b\t-0.7\n"),
+        ("\\1-grams:", "\\1-grams of the text"),
+    ],
+)
+def test_the_same_model_written_otherwise_is_the_same_model(old: str, new: str, tmp_path: Path) -> None:
+    plain, other = tmp_path / "plain.arpa", tmp_path / "other.arpa"
+    plain.write_text(GOOD)
+    assert old in GOOD
+    other.write_text(GOOD.replace(old, new, 1))
+    assert format_arpa(read_arpa(other)) == format_arpa(read_arpa(plain, tolerant=False))
+    with pytest.raises(LanguageModelError, match=r"other\.arpa:\d+: "):
+        read_arpa(other, tolerant=False)
 
 
 def test_not_utf8_is_named(tmp_path: Path) -> None:

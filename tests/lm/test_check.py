@@ -76,3 +76,35 @@ def test_without_kenlm_the_message_says_what_to_do(tmp_path: Path, monkeypatch: 
     monkeypatch.setitem(sys.modules, "kenlm", None)
     with pytest.raises(MissingExtraError, match=r"needs the package kenlm, which is not installed: pip install kenlm"):
         check_model(path)
+
+
+def test_what_kenlm_refuses_is_told_and_compared_through_a_copy(tmp_path: Path) -> None:
+    pytest.importorskip("kenlm", reason="KenLM is not installed here")
+    path = write_model(tmp_path / "model.arpa", "witten-bell", 2)
+    path.write_text("made by hand\n" + path.read_text())
+    found = check_model(path)
+    assert found.ok
+    assert found.largest_difference is not None
+    assert f"KenLM refuses it ({path}:1: 'made by hand' found, " in found.sentence()
+
+
+def test_empty_highest_orders_do_not_count(tmp_path: Path) -> None:
+    pytest.importorskip("kenlm", reason="KenLM is not installed here")
+    path = write_model(tmp_path / "model.arpa", "witten-bell", 2)
+    header = "".join(f"ngram {n}=0\n" for n in range(3, 8))
+    sections = "".join(f"\\{n}-grams:\n\n" for n in range(3, 8))
+    text = path.read_text().replace("\n\n\\1-grams", f"\n{header}\n\\1-grams").replace("\\end\\", f"{sections}\\end\\")
+    path.write_text(text)
+    found = check_model(path)
+    assert found.ok, found.sentence()
+    assert (found.order, found.tokens) == (2, 2000)
+
+
+def test_kenlm_s_own_complaint_names_the_file_and_the_reason(shared: Path) -> None:
+    pytest.importorskip("kenlm", reason="KenLM is not installed here")
+    path = shared / "arpa/many-suffix-bigrams-absent-3-of-4.arpa"
+    with pytest.raises(LanguageModelError) as error:
+        kenlm_scorer(path)
+    assert str(error.value).startswith(f"{path}: KenLM cannot load it: Avoid pruning n-grams like")
+    assert "search_hashed" not in str(error.value)
+    assert "Avoid pruning" in check_model(path).sentence()

@@ -73,3 +73,19 @@ def test_weights_beyond_float64_are_infinite(model: Path) -> None:
     assert found["highest_sum"] == math.inf
     assert found["explained"][0]["p"] == math.inf
     assert "sums to" in format_inspection(found)
+
+
+def test_the_most_probable_words_after_an_ngram_are_shown(model: Path) -> None:
+    (explained,) = inspect_model(model, ["b a"], top=2)["explained"]
+    assert [entry["word"] for entry in explained["next"]] == ["b", "a"]
+    assert [entry["p"] for entry in explained["next"]] == pytest.approx([10**-0.4, 10**-0.7])
+    text = format_inspection(inspect_model(model, ["b a"], top=1))
+    assert "most probable after 'b a'\n  0.398107     b" in text
+    assert "most probable" not in format_inspection(inspect_model(model, ["b a"], top=0)).partition("p(a | b)")[2]
+
+
+def test_a_file_of_others_is_shown_with_what_kenlm_refuses(model: Path) -> None:
+    model.write_text("by hand\n" + ARPA.replace("ngram 2=2\n", "ngram 2=2\nngram 7=0\n"))
+    found = inspect_model(model)
+    assert (found["order"], found["ngrams_per_order"]) == (2, [4, 2])
+    assert f"KenLM refuses it: {model}:1: 'by hand' found" in format_inspection(found)
