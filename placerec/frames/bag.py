@@ -1,6 +1,7 @@
 """Recordings of ROS 1 (.bag), ROS 2 (folders with metadata.yaml, .db3, .mcap), read by `rosbags` without ROS."""
 
 import logging
+import re
 import struct
 from array import array
 from collections.abc import Callable, Iterator
@@ -28,6 +29,7 @@ _REMEDIES = {
 }
 RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 
+_PLANAR = ("nv12", "nv21", "yuv420", "i420", "yv12")
 # encoding -> channels, bytes a channel, OpenCV's conversion to grey ("" where the one channel is grey already).
 _ENCODINGS = {
     "mono8": (1, 1, ""),
@@ -46,12 +48,17 @@ _ENCODINGS = {
     "uyvy": (2, 1, "YUV2GRAY_UYVY"),
     "yuv422_yuy2": (2, 1, "YUV2GRAY_YUY2"),
     "yuyv": (2, 1, "YUV2GRAY_YUY2"),
+    # The grey levels come first, and half as many bytes of colour behind them.
+    **dict.fromkeys(_PLANAR, (1, 1, "")),
     **{
         f"bayer_{order}{8 * size}": (1, size, f"Bayer{order.upper()}2GRAY")
         for order in ("rggb", "bggr", "gbrg", "grbg")
         for size in (1, 2)
     },
 }
+# A topic of compressed depth is called so, and its messages' format, whose data begin with as many bytes of their own.
+_DEPTH, _DEPTH_HEADER = "compressedDepth", 12
+_VIDEO = re.compile(r"(?i)\b(h\.?264|h\.?265|avc1?|hevc|av1|vp[89])\b")
 log = logging.getLogger(__name__)
 
 
@@ -114,14 +121,18 @@ def list_bag(path: Path, topic: str | None) -> tuple[str, "array[int]", list[flo
     SourceError for a bag that cannot be read or without such a topic; what a damaged bag still gives is kept, and the
     rest told of in a warning.
     """
-    stamps, stored = array("q"), array("q")
+    stamps, stored, reason = array("q"), array("q"), ""
     with _opened(path) as reader:
         topic = _choose(path, reader, topic)
-        for _, when, data in _messages(reader, path, topic):
+        for kind, when, data in _messages(reader, path, topic):
+            if not stored:
+                reason = _unreadable(kind, data, _is_ros1(path))
             stamps.append(_stamp(data, _is_ros1(path)))
             stored.append(when)
     if not stored:
         raise SourceError(f"{path}: holds no image on {topic}; name another topic, or remove it")
+    if reason:
+        raise SourceError(f"{path}: the {len(stored)} images on {topic} {reason}")
     times = np.array(stamps, np.int64)
     if reason := _unusable(times):
         if times.any():
@@ -186,8 +197,11 @@ def _choose(path: Path, reader: Any, topic: str | None) -> str:
             return topic
         what = f"{topic} is of {kinds[topic]}, not of images" if topic in kinds else f"has no topic {topic}"
         raise SourceError(f"{path}: {what}; its topics of images are: {_listed(images)}")
-    if len(images) == 1:
-        return images[0]
+    pictures = [name for name in images if not name.endswith(_DEPTH)]
+    if len(pictures) == 1:
+        return pictures[0]
+    if images and not pictures:
+        raise SourceError(f"{path}: has compressed depth alone ({_listed(images)}); to read it, name it (--topic)")
     if images:
         raise SourceError(f"{path}: has several topics of images: {_listed(images)}; choose one (--topic)")
     others = _listed([f"{name} ({kind})" for name, kind in sorted(kinds.items())])
@@ -209,6 +223,23 @@ def _messages(reader: Any, path: Path, topic: str) -> Iterator[tuple[str, int, b
             return
         yield connection.msgtype, when, data
         count += 1
+
+
+def _unreadable(kind: str, data: bytes, ros1: bool) -> str:
+    """Why no message that is like the first one on a topic can be read; "" if some may be."""
+    try:
+        message = _parser(ros1)(data, kind)
+    except Exception:  # Each message that is damaged is told of where it is read.
+        return ""
+    if kind == COMPRESSED:
+        video = _VIDEO.search(message.format)
+        return f"are a video in pieces ({video[1]}), which is not read; make a video file of them" if video else ""
+    known = message.encoding in (*_ENCODINGS, "32FC1")
+    return "" if known else f"have {_unknown_encoding(message.encoding)}"
+
+
+def _unknown_encoding(encoding: str) -> str:
+    return f"the encoding {encoding!r}, which is not read; known are {', '.join([*_ENCODINGS, '32FC1'])}"
 
 
 def _stamp(data: bytes, ros1: bool) -> int:
@@ -237,12 +268,11 @@ def gray_of(message: Any, kind: str, name: str) -> Gray:
     """
     data = np.asarray(message.data)
     if kind == COMPRESSED:
-        return decode_gray(data.tobytes(), name)
+        return decode_gray(data.tobytes()[_DEPTH_HEADER if _DEPTH in message.format else 0 :], name)
     if message.encoding == "32FC1":
         return _of_floats(_pixels(message, data, 1, "f4", name)[..., 0], name)
     if message.encoding not in _ENCODINGS:
-        known = ", ".join([*_ENCODINGS, "32FC1"])
-        raise SourceError(f"{name} has the encoding {message.encoding!r}, which is not read; known are {known}")
+        raise SourceError(f"{name} has {_unknown_encoding(message.encoding)}")
     import cv2
 
     channels, size, conversion = _ENCODINGS[message.encoding]
@@ -257,6 +287,9 @@ def gray_of(message: Any, kind: str, name: str) -> Gray:
 def _pixels(message: Any, data: NDArray[np.uint8], channels: int, kind: str, name: str) -> NDArray[Any]:
     """The message's data as (height, width, channels), without the padding of its rows and in this machine's order."""
     height, width, step = int(message.height), int(message.width), int(message.step)
+    if message.encoding in _PLANAR and len(data) < height * step * 3 // 2:
+        # Some drivers count the rows of colour, too.
+        height = height * 2 // 3
     item = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
     row = width * channels * item.itemsize
     if not row or step < row or len(data) < height * step or not height:

@@ -131,6 +131,34 @@ def test_topics(tmp_path: Path) -> None:
     assert "/cam09 and 2 more; choose one" in failure(many)
 
 
+def test_compressed_depth_is_read_only_if_it_is_named(tmp_path: Path) -> None:
+    deep = (np.arange(64 * 48, dtype=np.uint16) % 4000).reshape(48, 64)
+    png = cv2.imencode(".png", deep)[1].tobytes()
+    depth = [compressed(bytes(12) + png, format="16UC1; compressedDepth png")]
+    path = write_bag(
+        tmp_path / "both", {"/d/compressedDepth": depth, "/c/compressed": [compressed(jpeg(pictures(1)[0]))]}
+    )
+    assert repr(find_one(path).recording) == f"Bag(path={path!r}, topic='/c/compressed', every=1)"
+    (tmp_path / "deep.png").write_bytes(png)
+    (gray,) = read_images(find_one(path, topic="/d/compressedDepth"))
+    assert np.array_equal(gray, read_gray(tmp_path / "deep.png"))
+    alone = write_bag(tmp_path / "alone", {"/d/compressedDepth": depth})
+    said = "has compressed depth alone (/d/compressedDepth); to read it, name it (--topic)"
+    assert failure(alone) == f"{alone}: {said}"
+
+
+def test_a_topic_that_cannot_be_read_is_refused_once(tmp_path: Path) -> None:
+    many = [compressed(b"\0\0\0\1g", START + i, format="h264") for i in range(30)]
+    video = write_bag(tmp_path / "video", {"/v": many})
+    what = "are a video in pieces (h264), which is not read; make a video file of them"
+    assert failure(video) == f"{video}: the 30 images on /v {what}"
+    odd = write_bag(tmp_path / "odd", {"/o": [raw(pictures(1)[0], "nv99", START + i) for i in range(7)]})
+    assert failure(odd).startswith(f"{odd}: the 7 images on /o have the encoding 'nv99', which is not read; known are")
+    # One among others is skipped as a damaged one is.
+    some = write_bag(tmp_path / "some", {"/o": [*stream(3), raw(pictures(1)[0], "nv99", START + 10**9)]})
+    assert [isinstance(gray, str) for gray in read_images(find_one(some))] == [False] * 3 + [True]
+
+
 @pytest.mark.parametrize("storage", ["ros1", "sqlite3", "mcap"])
 def test_frames_are_in_the_order_of_their_stamps(tmp_path: Path, storage: str) -> None:
     """Messages arrive late: the order in which they are stored is not that of the cameras."""

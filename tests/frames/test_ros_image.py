@@ -76,6 +76,16 @@ def test_luma_of_yuv(encoding: str, luma: int) -> None:
     assert np.array_equal(levels(packed, encoding), GRAY)
 
 
+@pytest.mark.parametrize("encoding", ["nv12", "nv21", "yuv420", "i420", "yv12"])
+def test_grey_levels_before_colours(encoding: str) -> None:
+    planes = np.concatenate([GRAY.reshape(-1), np.full(GRAY.size // 2, 128, np.uint8)])
+    assert np.array_equal(levels(GRAY, encoding, data=planes), GRAY)
+    assert np.array_equal(levels(planes.reshape(72, 64), encoding), GRAY)
+    padded = np.zeros((72, 80), np.uint8)
+    padded[:48, :64] = GRAY
+    assert np.array_equal(levels(GRAY, encoding, step=80, data=padded.reshape(-1)), GRAY)
+
+
 @pytest.mark.parametrize(
     ("pattern", "colours"), [("rggb", "RGGB"), ("bggr", "BGGR"), ("gbrg", "GBRG"), ("grbg", "GRBG")]
 )
