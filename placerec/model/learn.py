@@ -72,17 +72,34 @@ def learn_model(
             spec = spec or DescriptorSpec()
             kept = keep_described(sequences, spec, journal, work, progress)
             values, table = kept.values.pieces, kept.table
-        made = DictionarySet.fit(values, spec=spec, places=table.places, options=words, work=work)
-        names = tuple(one.name for one in sequences)
-        made = DictionarySet(tuple(replace(one, sequences=names) for one in made.dictionaries))
-        folder = ModelFolder(path)
-        made.save(folder.words)
-        (path / TOKENS).mkdir()
-        fill_folder(streams_of_rows(values, table, made), made, path / TOKENS)
-        weigh = partial(learn_weights_anew, values, table, spec, made.options, options, work)
-        evidence = train_folder(folder, [path / TOKENS], options, weigh=weigh)
+        return learn_folder(ModelFolder(path), values, table, spec, words, options, work)
+
+
+def learn_folder(
+    folder: ModelFolder,
+    values: Source,
+    table: FrameTable,
+    spec: DescriptorSpec,
+    words: DictionarySetOptions,
+    options: ModelOptions,
+    work: Executor | None = None,
+) -> LearnedEvidence:
+    """Learn from descriptors, and write all that `learn_model` writes into a folder that is there.
+
+    `values`: the descriptors, of `spec`, of the frames in `table`, in memory or streamed. Arguments and errors
+    otherwise are those of `learn_model`.
+    """
+    made = DictionarySet.fit(values, spec=spec, places=table.places, options=words, work=work)
+    names = tuple(table.by_sequence())
+    made = DictionarySet(tuple(replace(one, sequences=names) for one in made.dictionaries))
+    made.save(folder.words)
+    tokens = folder.path / TOKENS
+    tokens.mkdir()
+    fill_folder(streams_of_rows(values, table, made), made, tokens)
+    weigh = partial(learn_weights_anew, values, table, spec, made.options, options, work)
+    evidence = train_folder(folder, [tokens], options, weigh=weigh)
     if evidence is None:
-        raise ModelError(f"{out}: nothing was learned")
+        raise ModelError(f"{tokens}: holds nothing to learn the weight of words from")
     return evidence
 
 

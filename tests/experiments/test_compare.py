@@ -201,7 +201,7 @@ def test_progress_tells_frames_and_methods(runs: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("methods", [["hohmm", "svm"], []])
 def test_unknown_methods_and_none_are_refused_before_any_work(runs: Path, tmp_path: Path, methods: list[str]) -> None:
-    with pytest.raises(EvaluationError, match=r"choose from hohmm, hohmm-fixed, .*ullah2008.*knn"):
+    with pytest.raises(EvaluationError, match=r"choose from hohmm, hohmm-single, hohmm-paper, .*ullah2008.*knn"):
         run(runs, tmp_path / "out", methods=methods)
     assert not (tmp_path / "out").exists()
 

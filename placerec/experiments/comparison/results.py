@@ -11,7 +11,15 @@ from placerec.arrays import Floats
 from placerec.evaluation.bootstrap import Pair, compare_pairs, count_blocks, draw, interval
 from placerec.evaluation.metrics import evaluate
 from placerec.evaluation.summary import percent, shorten
-from placerec.experiments.comparison.benchmark import COMPARED, DESCRIPTORS, TWO_WORDS, WORDS, FrontEndCost, MethodRun
+from placerec.experiments.comparison.benchmark import (
+    COMPARED,
+    DESCRIPTORS,
+    SEVERAL_WORDS,
+    TWO_WORDS,
+    WORDS,
+    FrontEndCost,
+    MethodRun,
+)
 from placerec.figures.canvas import figure_file, place_colours
 
 if TYPE_CHECKING:
@@ -22,7 +30,7 @@ _WIDTH, _LEAST_HEIGHT = 10.0, 5.2
 _TITLE = 0.65
 # The height of a label in inches, and the least cost that is drawn, in microseconds.
 _LABEL, _LEAST = 0.19, 0.1
-_KINDS = (WORDS, TWO_WORDS, DESCRIPTORS)
+_KINDS = (WORDS, TWO_WORDS, SEVERAL_WORDS, DESCRIPTORS)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from placerec.errors import EvaluationError, SourceError, check_optional
 from placerec.evaluation.bootstrap import LEAST
 from placerec.experiments.comparison.benchmark import (
     COMPARED,
+    SEVERAL_WORDS,
     TWO_WORDS,
     Benchmark,
     EncodedSequences,
@@ -25,6 +26,7 @@ from placerec.experiments.comparison.benchmark import (
     train_models,
 )
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge, plot_comparison
+from placerec.experiments.comparison.several import learn_several
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
 from placerec.figures.canvas import check_figure
 from placerec.files import whole_folder, write_text
@@ -76,6 +78,7 @@ def compare(
     cache = out / "cache" if cache is None else Path(cache)
     with held_output(out, cache):
         encoded: list[EncodedSequences] = []
+        jobs: list[WordsJob] = []
         for spec in SPECS[: 1 + any(COMPARED[name].kind == TWO_WORDS for name in chosen)]:
             with progress(f"describe ({spec.kind})") as show:
                 described = describe_all([*training, *tests], spec, cache, progress=show)
@@ -87,8 +90,13 @@ def compare(
                     )
                 job = WordsJob(*both, DictionaryOptions(size=size, seed=seed), cache)
                 encoded.append(encode(job, () if encoded else {COMPARED[name].view for name in chosen}))
+                jobs.append(job)
+        several = None
+        if any(COMPARED[name].kind == SEVERAL_WORDS for name in chosen):
+            several = learn_several(jobs[0], seed)
         models = train_models(encoded[0], len(training), cache)
-        benchmark = Benchmark(encoded[0], len(training), models, seed, *encoded[1:])
+        second = encoded[1] if len(encoded) > 1 else None
+        benchmark = Benchmark(encoded[0], len(training), models, seed, second, several)
         runs = {}
         with progress("methods") as show:
             for done, name in enumerate(chosen, start=1):
@@ -146,8 +154,12 @@ def _split(
 def _method_run(name: str, benchmark: Benchmark, folder: Path) -> MethodRun:
     """The run in `folder` if it is one on the same data, or else a new one, which is left there."""
     method = COMPARED[name]
-    second = benchmark.second.dictionary.fingerprint if benchmark.second and method.kind == TWO_WORDS else ""
-    key = key_of(name, benchmark.key, second)
+    more = ""
+    if benchmark.second and method.kind == TWO_WORDS:
+        more = benchmark.second.dictionary.fingerprint
+    if benchmark.several and method.kind == SEVERAL_WORDS:
+        more = benchmark.several.models.folder.path.name
+    key = key_of(name, benchmark.key, more)
     known = load(folder / RUN_JSON)
     if known.get("key") == key:
         log.info("%s: as the run before left it", name)
