@@ -24,6 +24,7 @@ _ROOMS = {
     "placerec.words": ("Selection", "WordStream", "parse_selection", "read_stream", "select", "write_stream"),
     "placerec.words.tokenize": ("tokenize",),
     "placerec.lm": ("BackoffModel", "count_ngrams", "estimate", "read_arpa", "smoothing", "write_arpa"),
+    "placerec.lm.adapt": ("adapt_lm",),
     "placerec.lm.check": ("check_model",),
     "placerec.lm.inspect": ("inspect_model",),
     "placerec.hohmm": (
@@ -77,6 +78,7 @@ if TYPE_CHECKING:
     from placerec.lab.layout import render_lab
     from placerec.learning import learn
     from placerec.lm import BackoffModel, count_ngrams, estimate, read_arpa, smoothing, write_arpa
+    from placerec.lm.adapt import adapt_lm
     from placerec.lm.check import check_model
     from placerec.lm.inspect import inspect_model
     from placerec.methods import decode, follow_live, load_decoder
@@ -114,6 +116,7 @@ __all__ = [
     "Transition",
     "WordStream",
     "__version__",
+    "adapt_lm",
     "calibrate",
     "check_model",
     "compare",

@@ -36,7 +36,7 @@ SRILM_HEAD = """\
 """
 GROUPS = {
     "From images to words": ("describe", "train-words", "tokenize", "show-words", "show-frame", "stability"),
-    "From words to models": ("train-lm", "update", "inspect", "check"),
+    "From words to models": ("train-lm", "update", "inspect", "check", "adapt-lm"),
     "From words to beliefs": ("decode", "evaluate", "calibrate"),
     "Experiments": ("compare", "experiment", "lab", "demo"),
 }
@@ -50,7 +50,7 @@ PYTHON = {
     "demo": "",
 }
 # Those with a table of options on docs/srilm.md.
-TABLED = ("ngram-count", "ngram", "ngram-merge")
+TABLED = ("ngram-count", "ngram", "ngram-merge", "disambig", "hidden-ngram")
 COMMON = {"quiet", "verbose", "help"}
 
 

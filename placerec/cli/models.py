@@ -246,6 +246,31 @@ def check(models: tuple[Path, ...], as_json: bool) -> None:
         sys.exit(1)
 
 
+@click.command(
+    "adapt-lm", epilog='Example: placerec adapt-lm kitchen.arpa -o new.arpa --add w99=0.001 --boost "w07 w08"=3'
+)
+@click.argument("model", metavar="MODEL.arpa", type=shared.PATH)
+@shared.output_option("OUT.arpa", "The model to write.")
+@click.option(
+    "--add", multiple=True, metavar="WORD[=P]", help="A new word; P is its probability where nothing else is known."
+)
+@click.option("--boost", multiple=True, metavar='"W1 W2"=FACTOR', help="An n-gram to make so many times as probable.")
+@shared.talk_options
+def adapt_lm(model: Path, out: Path, add: tuple[str, ...], boost: tuple[str, ...]) -> None:
+    """Add words to a model, or boost n-grams.
+
+    Without P a word is as probable as the rarest of the model. FACTOR may be below 1. Every context sums to 1 still:
+    what is left of it is shared by the other words as before.
+    """
+    from placerec.lm.adapt import adapt_lm as run, parse_addition, parse_boost
+
+    with shared.usage("--add"):
+        words = dict(map(parse_addition, add))
+    with shared.usage("--boost"):
+        boosts = dict(map(parse_boost, boost))
+    run(model, out, words, boosts)
+
+
 @click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
 @click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=shared.PATH_OR_STREAM)
 @click.option("-m", "--model", metavar="MODEL/", type=shared.PATH, required=True, help="The folder of train-lm.")

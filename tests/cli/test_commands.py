@@ -36,8 +36,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_all_commands_of_the_contract_so_far_are_there() -> None:
     expected = (
-        "calibrate check compare decode demo describe evaluate experiment inspect lab learn show-frame show-words "
-        "stability tokenize train-lm train-words update"
+        "adapt-lm calibrate check compare decode demo describe evaluate experiment inspect lab learn show-frame "
+        "show-words stability tokenize train-lm train-words update"
     )
     assert " ".join(NAMES) == expected
     assert set(commands.commands) == {*NAMES, *TOOLS}
