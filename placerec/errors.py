@@ -59,6 +59,8 @@ _OPTIONAL = {
     "matplotlib": ("matplotlib", "pip install 'placerec[plot]'"),
     "sklearn": ("scikit-learn", "pip install 'placerec[systems]'"),
     "rosbags": ("rosbags", "pip install 'placerec[bag]'"),
+    "mcap": ("mcap", "pip install 'placerec[bag]'"),
+    "mcap_protobuf": ("mcap-protobuf-support", "pip install 'placerec[bag]'"),
     "distributed": ("distributed", "pip install 'placerec[cluster]'"),
     "kenlm": ("kenlm", "pip install kenlm (it is compiled; not on Windows, nor on Python 3.13)"),
 }

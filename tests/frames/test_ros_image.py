@@ -10,8 +10,8 @@ from helpers.recordings import pictures, raw
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
-from placerec.frames.bag import RAW, gray_of
 from placerec.frames.image import as_gray
+from placerec.frames.ros_image import RAW, gray_of
 
 COLOUR = pictures(1)[0]
 GRAY = cv2.cvtColor(COLOUR, cv2.COLOR_BGR2GRAY)

@@ -1,0 +1,105 @@
+"""Messages of images, as ROS has them, as grey levels: raw ones of every encoding, and compressed ones."""
+
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placerec.arrays import Singles
+from placerec.errors import SourceError
+from placerec.frames.image import as_gray, decode_gray
+from placerec.frames.sequence import Gray
+
+RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+
+_PLANAR = ("nv12", "nv21", "yuv420", "i420", "yv12")
+# encoding -> channels, bytes a channel, OpenCV's conversion to grey ("" where the one channel is grey already).
+_ENCODINGS = {
+    "mono8": (1, 1, ""),
+    "8UC1": (1, 1, ""),
+    "mono16": (1, 2, ""),
+    "16UC1": (1, 2, ""),
+    "rgb8": (3, 1, "RGB2GRAY"),
+    "bgr8": (3, 1, "BGR2GRAY"),
+    "8UC3": (3, 1, "BGR2GRAY"),
+    "rgba8": (4, 1, "RGBA2GRAY"),
+    "bgra8": (4, 1, "BGRA2GRAY"),
+    "8UC4": (4, 1, "BGRA2GRAY"),
+    "rgb16": (3, 2, "RGB2GRAY"),
+    "bgr16": (3, 2, "BGR2GRAY"),
+    "yuv422": (2, 1, "YUV2GRAY_UYVY"),
+    "uyvy": (2, 1, "YUV2GRAY_UYVY"),
+    "yuv422_yuy2": (2, 1, "YUV2GRAY_YUY2"),
+    "yuyv": (2, 1, "YUV2GRAY_YUY2"),
+    # The grey levels come first, and half as many bytes of colour behind them.
+    **dict.fromkeys(_PLANAR, (1, 1, "")),
+    **{
+        f"bayer_{order}{8 * size}": (1, size, f"Bayer{order.upper()}2GRAY")
+        for order in ("rggb", "bggr", "gbrg", "grbg")
+        for size in (1, 2)
+    },
+}
+# A topic of compressed depth is called so, and its messages' format, whose data begin with as many bytes of their own.
+DEPTH, _DEPTH_HEADER = "compressedDepth", 12
+_VIDEO = re.compile(r"(?i)\b(h\.?264|h\.?265|avc1?|hevc|av1|vp[89])\b")
+
+
+def gray_of(message: Any, kind: str, name: str) -> Gray:
+    """The grey levels 0..255 of a message of type `kind`.
+
+    16 bits as in `decode_gray`; 32FC1: what is no positive number is 0, and 1, or the greatest value if that is more,
+    becomes 255. Raises SourceError that begins with `name` for an encoding that is not read and for missing data.
+    """
+    data = np.asarray(message.data)
+    if kind == COMPRESSED:
+        return decode_gray(data.tobytes()[_DEPTH_HEADER if DEPTH in message.format else 0 :], name)
+    if message.encoding == "32FC1":
+        return _of_floats(_pixels(message, data, 1, "f4", name)[..., 0], name)
+    if message.encoding not in _ENCODINGS:
+        raise SourceError(f"{name} has {_unknown_encoding(message.encoding)}")
+    import cv2
+
+    channels, size, conversion = _ENCODINGS[message.encoding]
+    pixels = _pixels(message, data, channels, f"u{size}", name)
+    if not conversion:
+        return as_gray(pixels[..., 0], name)
+    if min(pixels.shape[:2]) > 1:
+        pixels = cv2.cvtColor(pixels[..., 0] if channels == 1 else pixels, getattr(cv2, f"COLOR_{conversion}"))
+    return as_gray(pixels, name)
+
+
+def _pixels(message: Any, data: NDArray[np.uint8], channels: int, kind: str, name: str) -> NDArray[Any]:
+    """The message's data as (height, width, channels), without the padding of its rows and in this machine's order."""
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    if message.encoding in _PLANAR and len(data) < height * step * 3 // 2:
+        # Some drivers count the rows of colour, too.
+        height = height * 2 // 3
+    item = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
+    row = width * channels * item.itemsize
+    if not row or step < row or len(data) < height * step or not height:
+        what = f"{width}x{height} pixels in rows of {step} bytes need more than its {len(data)} bytes of data"
+        raise SourceError(f"{name} is damaged: {what}")
+    rows = data[: height * step].reshape(height, step)[:, :row]
+    return np.ascontiguousarray(rows).view(item).astype(kind).reshape(height, width, channels)
+
+
+def _of_floats(values: Singles, name: str) -> Gray:
+    values = np.where(np.isfinite(values) & (values > 0), values, np.float32(0)).astype(np.float32)
+    scaled = values * np.float32(255 / max(1.0, float(values.max())))
+    # Checked as any other picture is; its levels stay fractions.
+    as_gray(scaled.astype(np.uint8), name)
+    return scaled
+
+
+def unreadable(message: Any, kind: str) -> str:
+    """Why no message of type `kind` that is like this one can be read; "" if some may be."""
+    if kind == COMPRESSED:
+        video = _VIDEO.search(message.format)
+        return f"are a video in pieces ({video[1]}), which is not read; make a video file of them" if video else ""
+    known = message.encoding in (*_ENCODINGS, "32FC1")
+    return "" if known else f"have {_unknown_encoding(message.encoding)}"
+
+
+def _unknown_encoding(encoding: str) -> str:
+    return f"the encoding {encoding!r}, which is not read; known are {', '.join([*_ENCODINGS, '32FC1'])}"
