@@ -24,7 +24,6 @@ from placerec.frames.times import find_times_list, read_times, stamp_in, times_a
 log = logging.getLogger(__name__)
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff", ".pgm", ".ppm")
-RECORDINGS = (*video.SUFFIXES, *bag.SUFFIXES)
 # What devices, archivers and systems leave behind.
 _NOT_OURS = frozenset({"@eaDir", "#recycle", "$RECYCLE.BIN", "__MACOSX", "lost+found", "System Volume Information"})
 # Images that no OpenCV decodes, or only some do, or many at once.
@@ -120,7 +119,7 @@ def list_folder(folder: Path) -> Listing:
                     unread[os.path.splitext(entry.name)[1]] += 1
                 elif _LABELS.fullmatch(entry.name):
                     labels.append(entry.name)
-                elif entry.name.lower().endswith(RECORDINGS):
+                elif _is_recording(folder / entry.name):
                     recordings.append(entry.name)
     except OSError as error:
         raise SourceError(f"{folder}: cannot be read: {error.strerror}") from error
@@ -133,6 +132,10 @@ def list_folder(folder: Path) -> Listing:
         said.append(f"{len(nameless)} images whose names are no text, as {first!r}; rename them")
     ordered = tuple(sorted(folders, key=natural_key))
     return Listing(tuple(images), tuple(recordings), ordered, tuple(sorted(labels)), ", and ".join(said))
+
+
+def _is_recording(path: Path) -> bool:
+    return path.suffix.lower() in bag.SUFFIXES or video.is_video(path)
 
 
 def is_text(name: str) -> bool:

@@ -1,5 +1,6 @@
 """Videos and bags as sequences: their frames are listed, and labelled by their times."""
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,11 +12,12 @@ from placerec.frames.sequence import Frame, Recording, SourceOptions
 from placerec.frames.times import part_of
 
 WANTED = "videos (" + " ".join(f"*{suffix}" for suffix in video.SUFFIXES) + ") and bags (*.bag *.mcap *.db3)"
+log = logging.getLogger(__name__)
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a path is named as a video is, or named or laid out as a bag."""
-    return bag.is_bag(path) or (path.is_file() and path.suffix.lower() in video.SUFFIXES)
+    """Whether a path is a video by name or content, or named or laid out as a bag."""
+    return bag.is_bag(path) or (path.is_file() and video.is_video(path))
 
 
 def read_recording(path: Path, labels: Intervals | None, options: SourceOptions) -> tuple[tuple[Frame, ...], Recording]:
@@ -28,7 +30,12 @@ def read_recording(path: Path, labels: Intervals | None, options: SourceOptions)
         frames, first = _frames(path, stamps, labels, options)
         return frames, bag.Bag(path, topic, options.every, first, ranks, frames)
     times = video.list_times(path)
-    frames, first = _frames(path, times, labels, options)
+    seconds: Sequence[float] = times
+    if path.suffix.lower() in video.RAW_SUFFIXES:
+        if options.rate is None:
+            log.warning("%s: has no times; %g frames a second are taken; or say --rate HZ", path, video.RAW_RATE)
+        seconds = [number / (options.rate or video.RAW_RATE) for number in range(len(times))]
+    frames, first = _frames(path, seconds, labels, options)
     return frames, video.Video(path, options.every, first, times, frames)
 
 

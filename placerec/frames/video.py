@@ -6,6 +6,7 @@ times, for a decoder leaves out what is damaged.
 
 import logging
 import os
+import re
 from array import array
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator
@@ -20,6 +21,15 @@ from placerec.frames.image import as_gray, quiet
 from placerec.frames.sequence import Frame, Gray
 
 SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".flv", ".ogv", ".3gp", ".mts")
+# Streams without a container, and without times.
+RAW_RATE = 25.0
+RAW_SUFFIXES = (".h264", ".264", ".h265", ".265", ".hevc")
+# Other files are called so, too; and where a pattern must be found in what they begin with.
+_BY_CONTENT = {
+    **dict.fromkeys((".ts", ".m2ts"), re.compile(rb"(.{4})?G.{187}(?(1).{4})G", re.DOTALL)),
+    **dict.fromkeys(RAW_SUFFIXES, re.compile(rb"\0?\0\0\x01")),
+    ".gif": re.compile(rb"GIF8[79]a"),
+}
 # Seconds within which two times are one.
 _SAME = 0.0002
 # As many packets in a row that cannot be read are the end.
@@ -56,6 +66,22 @@ class Video:
                 yield self.listed[index], grabbed_gray(capture, name) if decoded else f"{name} cannot be decoded"
                 if index == len(self.listed) - 1:
                     return
+
+
+def is_video(path: Path) -> bool:
+    """Whether a file is named as a video is, or, where that may be something else, is one by content."""
+    suffix = path.suffix.lower()
+    pattern = _BY_CONTENT.get(suffix)
+    if pattern is None:
+        return suffix in SUFFIXES
+    try:
+        # A pipe would keep the work waiting for good.
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return pattern.match(file.read(400)) is not None
+    except OSError:
+        return False
 
 
 def list_times(path: Path) -> "array[float]":

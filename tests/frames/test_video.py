@@ -34,6 +34,8 @@ KINDS = [
     ("run.mkv", "MPG2"),
     ("run.avi", "MPG2"),
     ("run.mpg", "MPG2"),
+    ("run.ts", "MPG2"),
+    ("run.m2ts", "MPG2"),
 ]
 
 
@@ -291,3 +293,53 @@ def test_decoded_frames_are_found_again_by_their_times(caplog: pytest.LogCapture
     assert list(_walked(Path("x.mp4"), Scripted(0.0, None, None, 0.1))) == [0.0, 0.1]
     assert caplog.messages == ["x.mp4: is damaged: 2 packets are passed over"]
     assert _increasing([0.0, 0.1, 0.1, 0.3, 0.0], 0.1).tolist() == [0.0, 0.1, 0.2, 0.3, 0.4]
+
+
+def test_what_may_be_something_else_is_known_by_content(tmp_path: Path) -> None:
+    write_video(tmp_path / "runs/a.ts", "MPG2", pictures(3))
+    (tmp_path / "runs/code.ts").write_text("export const video = false;\n" * 50)
+    (tmp_path / "runs/b.h264").write_text("H.264 is described here.")
+    assert [sequence.name for sequence in find_sequences([tmp_path / "runs"])] == ["a"]
+    for name in ("code.ts", "b.h264"):
+        with pytest.raises(SourceError, match="is a file of no kind that is read"):
+            find_sequences([tmp_path / "runs" / name])
+
+
+def encoded(path: Path, codec: str, pixels: str = "yuv420p", **options: str) -> Path:
+    """A video of 20 pictures, ten a second, by a codec that OpenCV does not write."""
+    av = pytest.importorskip("av")
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=10, options=options)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, pixels
+        for picture in pictures():
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
+        container.mux(stream.encode())
+    return path
+
+
+@pytest.mark.parametrize(("name", "codec"), [("run.h264", "libx264"), ("run.265", "libx265")])
+def test_a_stream_without_times_goes_by_a_rate(
+    tmp_path: Path, name: str, codec: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / name
+    quiet = {"x265-params": "log-level=none"} if codec == "libx265" else {}
+    encoded(path.with_suffix(".hevc" if codec == "libx265" else ".h264"), codec, **quiet).rename(path)
+    (tmp_path / "run.labels").write_text("0 0.8 hall\n")
+    sequence = find_one(path)
+    assert [frame.time for frame in sequence.frames] == [i / 25 for i in range(20)]
+    assert f"{path}: has no times; 25 frames a second are taken; or say --rate HZ" in caplog.messages
+    caplog.clear()
+    timed = find_one(path, rate=10)
+    assert [(frame.time, frame.place) for frame in timed.frames] == [(i / 10, "hall" * (i < 8)) for i in range(20)]
+    assert caplog.messages == []
+    assert equal(read_images(timed), decoded(path))
+    assert equal(read_images(find_one(path, rate=10, begin=1)), decoded(path)[10:])
+
+
+def test_a_moving_gif_is_read_if_it_is_named(tmp_path: Path) -> None:
+    path = encoded(tmp_path / "run.gif", "gif", "rgb8")
+    sequence = find_one(path)
+    assert np.allclose([frame.time for frame in sequence.frames], np.arange(20) / 10)
+    assert equal(read_images(sequence), decoded(path))
+    (tmp_path / "a.png").touch()
+    assert [frame.name for frame in find_sequences([tmp_path])[0].frames] == ["a.png"]
