@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask, Singles
-from placerec.lm.logs import LOG_ZERO
+from placerec.lm.logs import LOG_ZERO, shown
 
 Cells = NDArray[np.uint64]
 # Words with their blank that are longer than this would make most of a line NUL bytes.
@@ -97,7 +97,7 @@ def first_lines(words: Sequence[str], encoding: str) -> PlainLines | PackedLines
 
 def _printed(values: Singles, lead: str) -> list[bytes]:
     numbers = np.where(np.isneginf(values), LOG_ZERO, values.astype(np.float64)).tolist()
-    return [f"{lead}{number:.7g}".encode() for number in numbers]
+    return [f"{lead}{shown(number, 7)}".encode() for number in numbers]
 
 
 def number_cells(values: Singles, lead: str, cells: Cells) -> None:

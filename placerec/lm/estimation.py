@@ -89,6 +89,8 @@ def estimate_mutable(
 
 # SRILM adds 1 to a context's count until 3 in a million is left: a million steps do for counts of 3e11.
 _MOST_STEPS = 1e6
+# N-grams times attempts that are told at once.
+_AT_ONCE = 1 << 18
 
 
 def _seen(counts: NgramCounts, n: int) -> Mask:
@@ -208,10 +210,13 @@ def _fill_order(model: MutableModel, order: _Order, trace: Trace) -> None:
         place, interpolated = np.searchsorted(again, group[used]), bool(interpolate[again].any())
         trace.no_mass(n, attempt, order.contexts[again], place, order.rows[used], p[used], interpolated=interpolated)
         _check_reachable(n, total[todo], spent[todo])
-        if attempt < 2 or trace.every_attempt:
+        if attempt < 2 or trace.every_step:
             total = np.where(todo & ~interpolate, total + 1, total)
         else:
-            total[again] = _least_total(order, again, total[again])
+            least = _least_total(order, again, total[again])
+            if trace.every_attempt:
+                _tell_attempts(order, again, total[again], least, attempt + 1, trace)
+            total[again] = least
         interpolate = interpolate & ~todo
         attempt += 1
     stored = order.rows[kept]
@@ -242,6 +247,23 @@ def _least_total(order: _Order, contexts: Ints, total: Floats) -> Floats:
         fits = enough(middle)
         low, high = np.where(fits, low, middle), np.where(fits, middle, high)
     return total + high
+
+
+def _tell_attempts(order: _Order, contexts: Ints, total: Floats, least: Floats, attempt: int, trace: Trace) -> None:
+    """Tell of the attempts of contexts (c,) with totals between `total` and `least` (c,), which both are done apart."""
+    stats = order.stats
+    for context, start, stop in zip(contexts.tolist(), total.tolist(), least.tolist(), strict=True):
+        at = np.flatnonzero(order.group == context)
+        types = [column[[context]] for column in (stats.types, stats.types2, stats.types3)]
+        size, told = max(1, _AT_ONCE // max(1, len(at))), attempt
+        for first in np.arange(start + 1, stop, size).tolist():
+            totals = np.arange(first, min(stop, first + size))[:, None]
+            factor, _ = _discounted(order.rule, order.count[at], Context(totals, *types), order.size)
+            p = factor * order.count[at] / totals
+            gone = int(np.broadcast_to(factor == 0, p.shape).sum())
+            trace.discarded_ngrams(order.n, int(order.silent[context]) * len(p), gone)
+            trace.again(order.n, told, int(order.contexts[context]), order.rows[at], p)
+            told += len(p)
 
 
 def _check_reachable(n: int, total: Floats, spent: Floats) -> None:

@@ -21,9 +21,12 @@ from placerec.lm.vocabulary import Vocabulary
 
 
 class Trace:
-    """A listener that hears nothing. `every_attempt`: it wants to hear of each time that a context is done again."""
+    """A listener that hears nothing.
 
-    every_attempt = False
+    `every_attempt`: it wants to hear of each time that a context is done again; `every_step`: of all of it.
+    """
+
+    every_attempt = every_step = False
 
     def discarded_contexts(self, n: int, count: int) -> None:
         """`count` contexts of order n end in </s> or hold a closed <unk>."""
@@ -51,6 +54,9 @@ class Trace:
 
         `rows` (m,): n-grams of the contexts `contexts[group]`, with probability p.
         """
+
+    def again(self, n: int, attempt: int, context: int, rows: Ints, p: Floats) -> None:
+        """What `no_mass` says of one context, k times from an attempt on, p (k, m) of its n-grams `rows` (m,)."""
 
     def order_done(self, n: int) -> None:
         """All probabilities of order n are there; the weights of its contexts come next."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from placerec.arrays import Ints
+from placerec.lm.arpa import row_blocks
 from placerec.lm.mutable import MutableModel
 from placerec.lm.score import ScoreTables
 from placerec.lm.trie import closed_trie
@@ -24,14 +25,16 @@ def read_model(
     debug: int = 0,
     limited: bool = False,
     what: str = "lm file",
+    cased: bool = False,
 ) -> tuple[MutableModel, ContextTimes]:
     """Read an ARPA file up to `order`, adding its words to `words`, and say what is odd about it.
 
-    `limited`: n-grams with other words than those of `words` are left out. Raises SrilmError, calling the file a
-    `what`, if it cannot be used.
+    `limited`: n-grams with other words than those of `words` are left out. `cased`: messages show words as they are in
+    the file. Raises SrilmError, calling the file a `what`, if it cannot be used.
     """
     expected = len(words.index)
     reader = Reader(name, words, streams, order, limited)
+    reader.cased = {} if cased else None
     reader.read()
     model, times = assemble(reader, expected)
     reader.finish(debug, what)
@@ -55,8 +58,9 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTi
         if n > 1:
             kept = created[n - 2][row[n - 2]] <= block.lines
             for i in np.flatnonzero(~kept).tolist():
-                ngram = " ".join(str(reader.words.words[word]) for word in block.words[i].tolist())
                 line = int(block.lines[i])
+                ngram = " ".join(str(reader.words.words[word]) for word in block.words[i].tolist())
+                ngram = (reader.cased or {}).get(line, ngram)
                 message = f'{reader.name}: line {line}: warning: no bow for prefix of ngram "{ngram}"'
                 reader.said.append((line, 0, message))
         model.stored[n - 1][row[-1][kept]] = True
@@ -70,6 +74,16 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTi
 def tables_of(model: MutableModel, words: WordList) -> ScoreTables:
     """The tables that give words, by SRILM's number, the probabilities of a model."""
     return model.tables(words.numbers(model.trie.vocabulary), len(words.words))
+
+
+def write_model(model: MutableModel, name: str, streams: Streams, debug: int) -> None:
+    """Write a model as an ARPA file, as it is: an n-gram's first words need not be listed, weights may be nan."""
+    if debug >= 1:
+        for n, stored in enumerate(model.stored, start=1):
+            streams.say(f"writing {int(stored.sum())} {n}-grams")
+    with streams.output(name) as file:
+        columns = model.log10_p, model.backoff, model.is_context
+        file.writelines(row_blocks(model.trie, *columns, stored=model.stored, encoding="latin-1"))
 
 
 def _weights(model: MutableModel, blocks: Sequence[tuple[int, Block]], rows: Sequence[Sequence[Ints]]) -> list[Ints]:

@@ -47,6 +47,8 @@ class Reader:
         self.slow: list[tuple[int, list[int], float, bool, float]] = []
         self.outside = 0
         self.failure = ""
+        # N-grams by line as the file writes them, where they are read otherwise; None: nobody asks.
+        self.cased: dict[int, str] | None = None
 
     @property
     def position(self) -> str:
@@ -221,6 +223,8 @@ class Reader:
         if self.limited and any(word not in self.words.index for word in names):
             self.outside += 1
             return
+        if self.cased is not None and names != fields[1 : n + 1]:
+            self.cased[self.number] = " ".join(fields[1 : n + 1])
         self.slow.append((self.number, [self.words.add(word) for word in names], log10_p, weighted, backoff))
 
     def weight(self, text: str) -> float:

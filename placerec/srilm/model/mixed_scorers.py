@@ -85,7 +85,7 @@ class LogLinear:
             # With -debug 3 the sum over all words comes first, and leaves the total.
             known = self.debug == 3 or self.context(t) in self.sums
             total = self.total(t)
-            log_total = np.float32(np.log10(total)) if total > 0 else np.float32(-np.inf)
+            log_total = log10(np.array([total]))[0]
             log10_p[t] -= log_total
             tags[t] = f"[cached={shown(float(p_of(np.array([log_total]))[0]), 7)}]" if known else f"[denom={total:.7g}]"
 

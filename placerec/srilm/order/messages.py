@@ -41,11 +41,11 @@ class Messages(Trace):
         self.streams = streams
         self.debug = debug
         self.numbers = numbers
-        self.every_attempt = debug >= 1
+        self.every_attempt, self.every_step = debug >= 1, debug >= 4
         self.visited = visited or (lambda n, rows: rows)
         self.weighed = weighed or (lambda n, contexts: contexts)
         self.announced = announced or {}
-        self._waiting: list[tuple[int, Ints, list[str], ContextOrder, int, Ints | None]] = []
+        self._waiting: list[tuple[int, Ints, list[str], ContextOrder, Any, Ints | None]] = []
         self._noted: list[Ints] = []
         self._closing: list[str] = []
         self._lost = np.zeros(2, np.int64)
@@ -67,7 +67,7 @@ class Messages(Trace):
         return self.visited(n - 1, contexts) if n > 1 else contexts
 
     def _say_of(
-        self, n: int, contexts: Ints, text: str, order: ContextOrder, *columns: Any, attempt: int = 0, rows: Any = None
+        self, n: int, contexts: Ints, text: str, order: ContextOrder, *columns: Any, attempt: Any = 0, rows: Any = None
     ) -> None:
         """Keep a line about each context (and its n-gram of `rows`) until it is known in which order they come.
 
@@ -83,7 +83,7 @@ class Messages(Trace):
 
     def _flush(self) -> None:
         entries: list[tuple[int, int, int, str]] = []
-        for n, contexts, lines, order, attempt, rows in self._waiting:
+        for n, contexts, lines, order, attempts, rows in self._waiting:
             # The order is worth finding only where there is more than one line.
             if len(self._waiting) == len(lines) == 1:
                 entries.append((0, 0, 0, lines[0]))
@@ -92,7 +92,9 @@ class Messages(Trace):
             places = order(n, contexts)
             entries += [
                 (place, attempt, mine, line)
-                for place, mine, line in zip(places.tolist(), own.tolist(), lines, strict=True)
+                for place, attempt, mine, line in zip(
+                    places.tolist(), np.broadcast_to(attempts, len(lines)).tolist(), own.tolist(), lines, strict=True
+                )
             ]
         self._waiting.clear()
         for *_, line in sorted(entries, key=lambda entry: entry[:3]):
@@ -149,6 +151,13 @@ class Messages(Trace):
         remedy = "disabling interpolation" if interpolated else "incrementing denominator"
         text = f'warning: {{1}} backoff probability mass left for "{{0}}" -- {remedy}'
         self._say_of(n, contexts, text, self.estimated, mass, attempt=2 * attempt + 1)
+
+    def again(self, n: int, attempt: int, context: int, rows: Ints, p: Floats) -> None:
+        order = np.argsort(self.visited(n, rows), kind="stable")
+        mass = 1 - np.add.accumulate(p[:, order], axis=1)[:, -1]
+        text = 'warning: {1} backoff probability mass left for "{0}" -- incrementing denominator'
+        attempts = 2 * (attempt + np.arange(len(p))) + 1
+        self._say_of(n, np.full(len(p), context), text, self.estimated, mass, attempt=attempts)
 
     def full_contexts(self, n: int, contexts: Ints) -> None:
         text = 'BOW denominator for context "{}" is zero; scaling probabilities to sum to 1'

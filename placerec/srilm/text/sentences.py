@@ -58,7 +58,8 @@ def handling_of(options: Mapping[str, Any], **others: Any) -> Handling:
 class Sentences(NamedTuple):
     """Lines as SRILM's word numbers (T,), lengths (S,), weights (S,); `shown`: their words, if `verbose`.
 
-    `escapes`: the number of the sentence that comes next, and the line. `places`: line numbers, if `verbose`.
+    `escapes`: the number of the sentence that comes next, and the line with its end. `places`: line numbers, if
+    `verbose`.
     """
 
     numbers: Ints
@@ -72,7 +73,8 @@ class Sentences(NamedTuple):
 def read_sentences(lines: Lines, words: WordList, handling: Handling) -> Iterator[Sentences]:
     """The sentences of a text, many at a time; lines that cannot be used are reported and left out."""
     blocks = lines.blocks(_BLOCK)
-    if not (handling.weight or handling.escape is not None or handling.verbose):
+    # Names that stand for nothing are met one by one.
+    if not (handling.weight or handling.escape is not None or handling.verbose or words.nameless):
         odd: list[bytes] = []
         # Nothing else is said meanwhile, so that messages keep their order.
         yield from make_ahead(_read_quickly(lines, usual_blocks(blocks, odd), words, handling))
@@ -101,26 +103,23 @@ class _Numbering:
 
     def __init__(self, words: WordList, adding: bool) -> None:
         self.words, self.adding = words, adding
-        # Names that stand for nothing are met one by one.
-        self.names = NameTable({} if words.nameless else words.index)
+        self.names = NameTable(words.index)
         self.asked = 0
 
     def numbers(self, fields: Fields) -> Ints:
         """The numbers of words (T,); new ones are added in order of occurrence."""
         numbers = self.names.find(fields, slice(None))
         missing = np.flatnonzero(numbers < 0)
-        closed = self.words.closed and self.words.meta_tag is None
-        if (not self.adding or closed) and not self.words.nameless:
+        if not self.adding or (self.words.closed and self.words.meta_tag is None):
             numbers[missing] = self.words.index[self.words.unknown]
             self.words.missed += len(missing)
             return numbers
         while len(missing):
             now, missing = np.split(missing, [max(_MANY, self.names.size // 2)])
-            number = self.words.number if self.adding else self.words.known
-            numbers[now] = [number(fields.text(i).decode("latin-1")) for i in now.tolist()]
+            numbers[now] = [self.words.number(fields.text(i).decode("latin-1")) for i in now.tolist()]
             self.asked += len(now)
             # Asking one by one has taken about as long as a new table takes.
-            if self.asked > self.names.size // 2 and not self.words.nameless:
+            if self.asked > self.names.size // 2:
                 self.names, self.asked = NameTable(self.words.index), 0
                 numbers[missing] = self.names.find(fields, missing)
                 missing = missing[numbers[missing] < 0]
@@ -137,7 +136,7 @@ def _read_carefully(lines: Lines, blocks: Iterable[bytes], words: WordList, hand
             yield _sentences(numbers, kept, escapes)
             numbers, kept, escapes = [], [], []
         if handling.escape is not None and line.startswith(handling.escape):
-            escapes.append((len(kept), line))
+            escapes.append((len(kept), line + lines.end))
             continue
         found = tokens(line)
         weight: float | None = 1.0

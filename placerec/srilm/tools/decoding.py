@@ -74,7 +74,7 @@ def observed_text(
                 yield Observed(shown, list(map(choices, numbers)), f"{name}: line {sentences.places[i]}: ")
             done = place
             if line is not None:
-                yield Observed([], [], "", line)
+                yield Observed([], [], "", line.removesuffix("\n"))
 
 
 class Printed(NamedTuple):

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from placerec.lm.vocabulary import SENTENCE_START
 from placerec.srilm.model.arpa_reader import read_tables
 from placerec.srilm.model.scorers import Model, Scorer
 from placerec.srilm.text.sentences import Handling, handling_of
@@ -132,6 +133,8 @@ _SCORING = {
 def ngram(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
     """Run `ngram` with these arguments; returns the exit status."""
     options = parse(tool, OPTIONS, arguments, streams)
+    if options["map-unk"] and options["rescore-ngram"]:
+        raise SrilmError("-map-unk goes not with -rescore-ngram: the n-grams to rescore have words of their own", 2)
     if options["null"] and options["lm"] is not None:
         raise SrilmError("-null, -lm, and -use-server are mutually exclusive", 2)
     if not options["null"] and options["lm"] is None:
@@ -214,6 +217,8 @@ class _Run:
         if options["noise-vocab"]:
             for line in self.streams.lines(options["noise-vocab"]):
                 noise |= {self.words.add(word) for word in tokens(line)[:1]}
+        if self.words.start in noise:
+            raise SrilmError(f"{SENTENCE_START} cannot be left out of sentences; name other words as noise")
         return handling_of(
             options.values,
             bad_weight=BAD_WEIGHT,

@@ -5,13 +5,13 @@ from functools import partial
 
 import numpy as np
 
-from placerec.lm.arpa import arpa_blocks
 from placerec.lm.counts import NgramCounts, add_counts, count_text, format_counts, recomputed
 from placerec.lm.discounts import Rule
 from placerec.lm.estimation import estimate_mutable
 from placerec.lm.mutable import insert_prefixes
 from placerec.lm.prune import prune
 from placerec.lm.stored_text import StoredText
+from placerec.srilm.model.arpa import write_model
 from placerec.srilm.order.counts import EstimationMessages, FirstSeen
 from placerec.srilm.text.counts_file import MOST, TOO_MANY, Table, parse_count, read_counts
 from placerec.srilm.text.sentences import handling_of, mark, read_sentences
@@ -244,12 +244,7 @@ def _write_model(
     insert_prefixes(mutable, trace)
     if options["prune"] > 0:
         prune(mutable, options["prune"], shortest=options["minprune"], trace=trace)
-    model = mutable.model()
-    if options["debug"] >= 1:
-        for n, keys in enumerate(model.trie.keys, start=1):
-            streams.say(f"writing {len(keys)} {n}-grams")
-    with streams.output(options["lm"]) as file:
-        file.writelines(arpa_blocks(model, encoding="latin-1"))
+    write_model(mutable, options["lm"], streams, options["debug"])
 
 
 def _write_rest(options: Parsed, counts: NgramCounts, words: WordList, first: FirstSeen, streams: Streams) -> None:

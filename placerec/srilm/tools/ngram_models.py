@@ -5,13 +5,12 @@ from functools import cache, partial
 
 import numpy as np
 
-from placerec.lm.arpa import row_blocks
 from placerec.lm.logs import LOG_ZERO, shown
 from placerec.lm.mix import merge, merge_weight
 from placerec.lm.mutable import MutableModel, reweigh, unite
 from placerec.lm.prune import prune, prune_improbable
 from placerec.lm.score import TokenSequence
-from placerec.srilm.model.arpa import read_model, tables_of
+from placerec.srilm.model.arpa import read_model, tables_of, write_model
 from placerec.srilm.model.count_models import CountModel, format_count_model, read_count_model
 from placerec.srilm.model.mixed_scorers import Cached, Lenient, LogLinear, Mixture
 from placerec.srilm.model.scorers import Model, Null, Scorer
@@ -78,6 +77,7 @@ class Models:
             debug=self.debug,
             limited=self.options["limit-vocab"] and words is None,
             what=what,
+            cased=option == "prune-history-lm",
         )
 
     def together(self, *mutables: MutableModel) -> list[MutableModel]:
@@ -214,10 +214,4 @@ class Models:
             self.streams.say("write() method not implemented")
             self.streams.say(f"error writing {name}")
             return
-        if self.debug >= 1:
-            for n, stored in enumerate(mutable.stored, start=1):
-                self.streams.say(f"writing {int(stored.sum())} {n}-grams")
-        with self.streams.output(name) as file:
-            # SRILM writes an n-gram though its first words are not listed.
-            columns = mutable.log10_p, mutable.backoff, mutable.is_context
-            file.writelines(row_blocks(mutable.trie, *columns, stored=mutable.stored, encoding="latin-1"))
+        write_model(mutable, name, self.streams, self.debug)

@@ -35,7 +35,7 @@ def _number(value: float) -> str:
 
 
 def _rank_lines(ranks: Ranks) -> str:
-    words = [_ratio(count, ranks.words) for count in ranks.leading_words]
+    words = [_ratio(count, ranks.words) if ranks.words else "0" for count in ranks.leading_words]
     tokens = [_ratio(count, ranks.tokens) for count in ranks.leading]
     square = ranks.square / ranks.tokens if ranks.tokens else 0.0
     return (
@@ -178,7 +178,7 @@ class _Summary:
             if escaped is not None:
                 if self.printer.debug == 0 and self.started:
                     self._group()
-                self.printer.streams.print(escaped + "\n")
+                self.printer.streams.print(escaped)
             before = place
 
     def _sentences(self, shown: Sequence[str], totals: Floats, lines: Sequence[_Line]) -> None:
@@ -232,7 +232,7 @@ def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting
             if table:
                 parts.append(_group(table, scorer, printer, counting, shown=True))
                 table = {}
-            printer.streams.print(line + "\n")
+            printer.streams.print(line + lines.end)
             continue
         words, count = split_count(line, counting.fractional, most=_MOST)
         if count is None:
