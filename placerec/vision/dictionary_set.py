@@ -82,8 +82,8 @@ class DictionarySet:
 
         of_view: dict[str, list[Dictionary]] = {}
         normalised = None
-        # A fifth of the descriptors, for many passes.
-        with spooled(projected(rows.source, pca), work) as codes:
+        # A fifth of the descriptors, for many passes; handed out for those of a map alone.
+        with spooled(projected(rows.source, pca), work if "plain" in options.views else None) as codes:
             warn_of_few(codes.rows, *options.sizes)
             if "plain" in options.views:
                 of_view["plain"] = learned(codes, pca)
