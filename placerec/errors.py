@@ -59,6 +59,7 @@ _OPTIONAL = {
     "matplotlib": ("matplotlib", "pip install 'placerec[plot]'"),
     "sklearn": ("scikit-learn", "pip install 'placerec[systems]'"),
     "rosbags": ("rosbags", "pip install 'placerec[bag]'"),
+    "av": ("PyAV", "pip install 'placerec[video]'"),
     "mcap": ("mcap", "pip install 'placerec[bag]'"),
     "mcap_protobuf": ("mcap-protobuf-support", "pip install 'placerec[bag]'"),
     "distributed": ("distributed", "pip install 'placerec[cluster]'"),

@@ -5,15 +5,18 @@ from array import array
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from placerec.arrays import Ints
-from placerec.errors import PlacerecError, SourceError
+from placerec.errors import PlacerecError, SourceError, check_optional
+from placerec.frames.av_video import Decoded, decode_pieces
 from placerec.frames.bag_reader import Codec, codec_of, is_ros1, opened, reason_of, stored_messages
-from placerec.frames.ros_image import DEPTH, gray_of, unreadable
+from placerec.frames.ros_image import DEPTH, codec_in, gray_of, unreadable
 from placerec.frames.sequence import EPOCH, Frame, Gray
 
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -27,13 +30,15 @@ log = logging.getLogger(__name__)
 class Bag:
     """Every `every`-th image of a topic from number `start` on, in order of time; `listed`: those that are read.
 
-    `ranks`: the place in that order of each stored message.
+    `ranks`: the place in that order of each stored message. `codec`: of the video that messages are pieces of, "" for
+    images.
     """
 
     path: Path
     topic: str
     every: int
     start: int = field(repr=False)
+    codec: str = field(repr=False, compare=False)
     ranks: "array[int]" = field(repr=False, compare=False)
     listed: tuple[Frame, ...] = field(repr=False, compare=False)
     endless: ClassVar[bool] = False
@@ -42,29 +47,44 @@ class Bag:
         return sorted(path for path in self.path.iterdir() if path.is_file()) if self.path.is_dir() else [self.path]
 
     def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
-        waiting: dict[int, tuple[Codec, bytes]] = {}
+        waiting: dict[int, Decoded] = {}
         number = first
         with opened(self.path) as reader:
-            for rank, (codec, _, data) in zip(self.ranks, stored_messages(reader, self.path, self.topic), strict=False):
-                index, between = divmod(rank - self.start, self.every)
+            messages = islice(stored_messages(reader, self.path, self.topic), len(self.ranks))
+            for place, decoded in self._decoded(messages):
+                index, between = divmod(self.ranks[place] - self.start, self.every)
                 if not between and first <= index < len(self.listed):
-                    waiting[index] = codec, data
+                    waiting[index] = decoded
                 while number in waiting:
-                    yield self.listed[number], self._gray(self.listed[number], *waiting.pop(number))
+                    frame = self.listed[number]
+                    yield frame, waiting.pop(number)(f"{self.path}: frame {frame.name} of {self.topic}")
                     number += 1
                 if number == len(self.listed):
                     return
         for frame in self.listed[number:]:
             yield frame, f"{self.path}: frame {frame.name} cannot be read again"
 
-    def _gray(self, frame: Frame, codec: Codec, data: bytes) -> Gray | str:
-        name = f"{self.path}: frame {frame.name} of {self.topic}"
-        try:
-            return gray_of(codec.parse(data), codec.kind, name)
-        except PlacerecError as error:
-            return str(error)
-        except Exception as error:  # Of what a damaged message makes the parser raise there is no list.
-            return f"{name} cannot be read ({reason_of(error)})"
+    def _decoded(self, messages: Iterator[tuple[Codec, int, bytes]]) -> Iterator[tuple[int, Decoded]]:
+        """What gives the grey levels of each message, in the order of storing."""
+        if not self.codec:
+            return enumerate(partial(_gray, codec, data) for codec, _, data in messages)
+        return decode_pieces(self.codec, (_piece(codec, data) for codec, _, data in messages))
+
+
+def _gray(codec: Codec, data: bytes, name: str) -> Gray | str:
+    try:
+        return gray_of(codec.parse(data), codec.kind, name)
+    except PlacerecError as error:
+        return str(error)
+    except Exception as error:  # Of what a damaged message makes the parser raise there is no list.
+        return f"{name} cannot be read ({reason_of(error)})"
+
+
+def _piece(codec: Codec, data: bytes) -> bytes:
+    try:
+        return bytes(np.asarray(codec.parse(data).data).tobytes())
+    except Exception:  # Of what a damaged message makes the parser raise there is no list.
+        return b""
 
 
 def is_bag(path: Path) -> bool:
@@ -74,27 +94,32 @@ def is_bag(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES
 
 
-def list_bag(path: Path, topic: str | None) -> tuple[str, "array[int]", list[float]]:
-    """The topic of images in a bag, the rank of each of its messages in order of time, and the times in that order.
+def list_bag(path: Path, topic: str | None) -> tuple[str, str, "array[int]", list[float]]:
+    """The topic of images in a bag, the codec of the video that they are pieces of ("" if of none), ranks and times.
 
+    Ranks are the places of messages in the order of time, and times are in that order.
     Times are the header's stamps in seconds; or, with a warning, all are when messages were stored: if some stamps are
     0 or by another clock, and if they go back by more than a second. Raises MissingExtraError without rosbags,
     SourceError for a bag that cannot be read or without such a topic; what a damaged bag still gives is kept, and the
     rest told of in a warning.
     """
-    stamps, stored, reason = array("q"), array("q"), ""
+    stamps, stored, reason, video = array("q"), array("q"), "", ""
     with opened(path) as reader:
         topic = _choose(path, reader, topic)
         for codec, when, data in stored_messages(reader, path, topic):
             # Each message that is damaged is told of where it is read.
             with suppress(Exception):
-                reason = reason if stored else unreadable(codec.parse(data), codec.kind)
+                if not stored:
+                    message = codec.parse(data)
+                    reason, video = unreadable(message, codec.kind), codec_in(message, codec.kind)
             stored.append(when)
             stamps.append(_stamp_of(codec, data))
     if not stored:
         raise SourceError(f"{path}: holds no image on {topic}; name another topic, or remove it")
     if reason:
         raise SourceError(f"{path}: the {len(stored)} images on {topic} {reason}")
+    if video:
+        check_optional("av", f"{path}: the {len(stored)} images on {topic} are a video in pieces ({video}), which")
     times = np.array(stamps, np.int64)
     if reason := _unusable(times):
         if times.any():
@@ -103,7 +128,7 @@ def list_bag(path: Path, topic: str | None) -> tuple[str, "array[int]", list[flo
     order = np.argsort(times, kind="stable")
     ranks = np.empty(len(order), np.int64)
     ranks[order] = np.arange(len(order))
-    return topic, array("q", ranks.tolist()), (times[order] / 1e9).tolist()
+    return topic, video, array("q", ranks.tolist()), (times[order] / 1e9).tolist()
 
 
 def _stamp_of(codec: Codec, data: bytes) -> int:

@@ -2,11 +2,13 @@
 
 import logging
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from placerec.frames import bag, video
+from placerec.errors import check_optional
+from placerec.frames import av_video, bag, video
 from placerec.frames.intervals import Intervals
 from placerec.frames.sequence import Frame, Recording, SourceOptions
 from placerec.frames.times import part_of
@@ -26,17 +28,25 @@ def read_recording(path: Path, labels: Intervals | None, options: SourceOptions)
     Raises SourceError for what cannot be read as one, MissingExtraError for a bag without rosbags.
     """
     if bag.is_bag(path):
-        topic, ranks, stamps = bag.list_bag(path, options.topic)
+        topic, codec, ranks, stamps = bag.list_bag(path, options.topic)
         frames, first = _frames(path, stamps, labels, options)
-        return frames, bag.Bag(path, topic, options.every, first, ranks, frames)
-    times = video.list_times(path)
+        return frames, bag.Bag(path, topic, options.every, first, codec, ranks, frames)
+    kind = video.Video
+    try:
+        times = video.list_times(path)
+    except video.UndecodableError as error:
+        if error.codec.upper() == "AV01":
+            check_optional("av", f"{path}: a video of codec {error.codec}", "convert it to H.264")
+        if not find_spec("av") or not av_video.can_decode(path):
+            raise
+        kind, times = av_video.AvVideo, error.times
     seconds: Sequence[float] = times
     if path.suffix.lower() in video.RAW_SUFFIXES:
         if options.rate is None:
             log.warning("%s: has no times; %g frames a second are taken; or say --rate HZ", path, video.RAW_RATE)
         seconds = [number / (options.rate or video.RAW_RATE) for number in range(len(times))]
     frames, first = _frames(path, seconds, labels, options)
-    return frames, video.Video(path, options.every, first, times, frames)
+    return frames, kind(path, options.every, first, times, frames)
 
 
 def _frames(

@@ -42,7 +42,15 @@ _ENCODINGS = {
 }
 # A topic of compressed depth is called so, and its messages' format, whose data begin with as many bytes of their own.
 DEPTH, _DEPTH_HEADER = "compressedDepth", 12
-_VIDEO = re.compile(r"(?i)\b(h\.?264|h\.?265|avc1?|hevc|av1|vp[89])\b")
+# FFmpeg's name of a codec, and how formats of messages call it.
+_CODECS = {
+    "h264": re.compile(r"(?i)h\.?264|avc1?"),
+    "hevc": re.compile(r"(?i)h\.?265|hevc"),
+    "av1": re.compile(r"(?i)av1"),
+    "vp8": re.compile(r"(?i)vp8"),
+    "vp9": re.compile(r"(?i)vp9"),
+}
+_VIDEO = re.compile(r"(?i)\b(h\.?26[45]|avc1?|hevc|av1|vp[89])\b")
 
 
 def gray_of(message: Any, kind: str, name: str) -> Gray:
@@ -92,11 +100,16 @@ def _of_floats(values: Singles, name: str) -> Gray:
     return scaled
 
 
+def codec_in(message: Any, kind: str) -> str:
+    """The codec of the video that a message of type `kind` is a piece of, by FFmpeg's name; "" if it is an image."""
+    found = _VIDEO.search(message.format) if kind == COMPRESSED else None
+    return next(name for name, pattern in _CODECS.items() if pattern.fullmatch(found[1])) if found else ""
+
+
 def unreadable(message: Any, kind: str) -> str:
     """Why no message of type `kind` that is like this one can be read; "" if some may be."""
     if kind == COMPRESSED:
-        video = _VIDEO.search(message.format)
-        return f"are a video in pieces ({video[1]}), which is not read; make a video file of them" if video else ""
+        return ""
     known = message.encoding in (*_ENCODINGS, "32FC1")
     return "" if known else f"have {_unknown_encoding(message.encoding)}"
 

@@ -31,10 +31,18 @@ _BY_CONTENT = {
     ".gif": re.compile(rb"GIF8[79]a"),
 }
 # Seconds within which two times are one.
-_SAME = 0.0002
+SAME = 0.0002
 # As many packets in a row that cannot be read are the end.
 _DAMAGED = 1000
 log = logging.getLogger(__name__)
+
+
+class UndecodableError(SourceError):
+    """A video of which OpenCV decodes no frame: its codec, and the times of all frames."""
+
+    def __init__(self, path: Path, codec: str, times: "array[float]") -> None:
+        super().__init__(f"{path}: OpenCV can decode no frame of it (codec {codec}); convert it to H.264")
+        self.codec, self.times = codec, times
 
 
 @dataclass(frozen=True)
@@ -93,8 +101,8 @@ def list_times(path: Path) -> "array[float]":
     _check_readable(path)
     with _opened(path, packets=True) as capture:
         # What comes before the start is there for the decoder's sake: it is cut off by the container.
-        times = array("d", sorted(time for time in _walked(path, capture) if time > -_SAME))
-    if any(after - before < _SAME for before, after in pairwise(times)):
+        times = array("d", sorted(time for time in _walked(path, capture) if time > -SAME))
+    if any(after - before < SAME for before, after in pairwise(times)):
         # MPEG program streams: not every packet has its time.
         with _opened(path) as capture:
             times = _increasing(_walked(path, capture), 1 / (_property(capture, "FPS") or 25))
@@ -103,7 +111,7 @@ def list_times(path: Path) -> "array[float]":
             code = int(_property(capture, "FOURCC")) & 0xFFFFFFFF
             text = code.to_bytes(4, "little").decode("latin-1").strip()
             codec = text if text.isprintable() and text else "unknown"
-            raise SourceError(f"{path}: OpenCV can decode no frame of it (codec {codec}); convert it to H.264")
+            raise UndecodableError(path, codec, times)
         _tell_truncated(path, capture, times)
     return times
 
@@ -145,7 +153,7 @@ def _increasing(found: Iterable[float], step: float) -> "array[float]":
     """The times of decoded frames, where one that does not come after the one before it is a step after that."""
     times = array("d")
     for time in found:
-        times.append(time if not times or time > times[-1] + _SAME else round(times[-1] + step, 6))
+        times.append(time if not times or time > times[-1] + SAME else round(times[-1] + step, 6))
     return times
 
 
@@ -162,8 +170,8 @@ def _decoded(capture: Any, times: "array[float]", *, late: bool) -> Iterator[tup
         failures, seconds = 0, _property(capture, "POS_MSEC") / 1000
         if lag is None:
             lag = seconds - times[0] if late else 0.0
-        found = bisect_left(times, seconds - lag - _SAME)
-        if not (done <= found < len(times) and times[found] - (seconds - lag) <= _SAME):
+        found = bisect_left(times, seconds - lag - SAME)
+        if not (done <= found < len(times) and times[found] - (seconds - lag) <= SAME):
             if before < seconds < times[done] + lag:
                 continue  # a frame that is not listed, for its packet is damaged
             # A time that makes no sense, as of the last B-frame in MPEG files.

@@ -1,0 +1,123 @@
+"""Videos that OpenCV's wheel cannot decode (AV1), and videos in pieces, as cameras send them, through PyAV.
+
+Frames are decoded by one thread, and turned and made grey as OpenCV's are.
+"""
+
+from array import array
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from placerec.errors import SourceError
+from placerec.frames.image import as_gray
+from placerec.frames.sequence import Frame, Gray
+from placerec.frames.video import SAME, Video
+
+# Of a frame that was decoded, given its name: the grey levels, or why there are none.
+Decoded = Callable[[str], Gray | str]
+
+
+@dataclass(frozen=True)
+class AvVideo(Video):
+    """A `Video` that is decoded by PyAV."""
+
+    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+        for position, decoded in _decoded(self.path, self.times):
+            index, between = divmod(position - self.start, self.every)
+            if between or index < first:
+                continue
+            if index >= len(self.listed):
+                return
+            yield self.listed[index], decoded(f"{self.path}: frame {self.listed[index].name}")
+
+
+def can_decode(path: Path) -> bool:
+    """Whether PyAV decodes a frame of a video."""
+    import av
+
+    try:
+        with av.open(str(path.absolute())) as container:
+            return next(_frames(container), None) is not None
+    except av.FFmpegError:
+        return False
+
+
+def decode_pieces(codec: str, pieces: Iterable[bytes]) -> Iterator[tuple[int, Decoded]]:
+    """The frames of a stream that comes in pieces, a frame each, with the numbers of their pieces, none left out."""
+    import av
+
+    # FFmpeg's own decoder of AV1 works with graphics cards alone.
+    context: Any = av.CodecContext.create("libdav1d" if codec == "av1" else codec, "r")
+    context.thread_count = 1
+    done = count = 0
+
+    def decode(packet: Any) -> Iterator[tuple[int, Decoded]]:
+        nonlocal done
+        try:
+            frames = context.decode(packet)
+        except av.FFmpegError:
+            return
+        for frame in frames:
+            if frame.pts is not None and done <= frame.pts:
+                yield from ((lost, _no_frame) for lost in range(done, frame.pts))
+                yield frame.pts, partial(_gray, frame)
+                done = frame.pts + 1
+
+    for number, piece in enumerate(pieces):
+        count = number + 1
+        # To a decoder an empty one is the end.
+        if piece:
+            packet = av.Packet(piece)
+            packet.pts = number
+            yield from decode(packet)
+    yield from decode(None)
+    yield from ((lost, _no_frame) for lost in range(done, count))
+
+
+def _decoded(path: Path, times: "array[float]") -> Iterator[tuple[int, Decoded]]:
+    """Every frame of these times in order, with its number."""
+    import av
+
+    done = 0
+    with av.open(str(path.absolute())) as container:
+        stream = container.streams.video[0]
+        for frame in _frames(container):
+            seconds = float((frame.pts - (stream.start_time or 0)) * stream.time_base)
+            found = bisect_left(times, seconds - SAME)
+            if done <= found < len(times) and times[found] - seconds <= SAME:
+                yield from ((lost, _no_frame) for lost in range(done, found))
+                yield found, partial(_gray, frame)
+                done = found + 1
+    yield from ((lost, _no_frame) for lost in range(done, len(times)))
+
+
+def _frames(container: Any) -> Iterator[Any]:
+    """The frames that can be decoded and have a time."""
+    import av
+
+    stream = container.streams.video[0]
+    stream.codec_context.thread_count = 1
+    for packet in container.demux(stream):
+        try:
+            frames = packet.decode()
+        except av.FFmpegError:
+            continue
+        yield from (frame for frame in frames if frame.pts is not None)
+
+
+def _gray(frame: Any, name: str) -> Gray | str:
+    import cv2
+    import numpy as np
+
+    picture = np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90))
+    try:
+        return as_gray(cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_BGR2GRAY), name)
+    except SourceError as error:
+        return str(error)
+
+
+def _no_frame(name: str) -> str:
+    return f"{name} cannot be decoded"
