@@ -105,7 +105,8 @@ class BackoffModel:
         scored[starts] = False
         unknown = ids == self.trie.vocabulary.index.get(UNKNOWN, -1)
         rows = tally_sentences(log10_p.astype(np.float32), unknown, scored, lengths, np.ones(len(lengths), bool))
-        return Totals(*rows.sum(axis=0).tolist())
+        ends, words, oovs, zeroprobs, total = rows.sum(axis=0).tolist()
+        return Totals(int(ends), int(words), int(oovs), int(zeroprobs), total)
 
     def ids(self, words: Sequence[str]) -> Ints:
         """Word numbers int64 (T,); `<unk>`'s, or -1 if it is not listed, for words that are not listed."""

@@ -47,7 +47,7 @@ def test_a_model_measures_text_as_ngram_does(tmp_path: Path) -> None:
     model = estimate(count_ngrams([["a", "b"], ["b"], ["a", "a", "c"]], 3), smoothing("witten-bell"))
     sentences = [["a", "b"], ["zzz"], [], ["c", "zzz", "a", "c"]]
     totals = model.perplexity(sentences)
-    assert (totals.sentences, totals.words, totals.oovs, totals.zeroprobs) == (4, 7, 2, 0)
+    assert repr(totals[:4]) == "(4, 7, 2, 0)"  # counts, and no floats
     marked = [["<s>", *sentence, "</s>"] for sentence in sentences]
     assert totals.log10_p == pytest.approx(
         sum(p for words in marked for p in model.score(words)[1:].tolist() if p > ZERO), rel=1e-6
