@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from placerec.arrays import Mask
 from placerec.errors import check_optional
 from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.figures.canvas import figure_file
@@ -21,17 +22,28 @@ from placerec.jobs import ProgressBar
 from placerec.lab.layout import render_lab
 from placerec.lm.inspect import format_inspection, inspect_model
 from placerec.model import ModelOptions, load_recognizer, read_corpus, train_model
-from placerec.vision import Dictionary, DictionaryOptions, DictionarySet, describe
-from placerec.words import read_stream
+from placerec.model.folder import ModelFolder
+from placerec.model.learn import learn_folder
+from placerec.vision import (
+    Descriptors,
+    Dictionary,
+    DictionaryOptions,
+    DictionarySet,
+    DictionarySetOptions,
+    describe,
+)
+from placerec.words import WordStream, read_stream
 from placerec.words.folder import write_tokens
 from placerec.words.tokenize import tokens_of
 
 SMOOTHINGS = ("witten-bell", "lidstone")
 ORDERS = (1, 2)
 BEST = ("witten-bell", 2)
+# What `placerec learn` makes, beside the paper's systems.
+LEARNED = ("learned", 2)
 # The paper's protocol: the first two runs of each condition train, the third tests.
 TEST_RUN = "3"
-OWNED = ("lab", "words.npz", "tokens", "models", "beliefs", "*.png", "report.html")
+OWNED = ("lab", "words.npz", "tokens", "models", "model", "beliefs", "*.png", "report.html")
 log = logging.getLogger(__name__)
 
 
@@ -39,11 +51,14 @@ log = logging.getLogger(__name__)
 DemoResults = dict[tuple[str, int], Evaluation]
 
 
-def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: ProgressBar) -> DemoResults:
+def run_demo(
+    out: Path | str, *, scale: str = "small", seed: int = 0, as_in_paper: bool = False, progress: ProgressBar
+) -> DemoResults:
     """`placerec demo`: render the laboratory, learn words and models, recognise the test runs, write the folder `out`.
 
-    `progress(label)` is a context manager that gives a callback(done, total). Returns a result per smoothing and order.
-    Raises MissingExtraError without matplotlib, before any work.
+    Beside the paper's systems, and first, is what `placerec learn` makes, unless all is to be `as_in_paper`.
+    `progress(label)` is a context manager that gives a callback(done, total). Returns a result per smoothing and order,
+    and one for LEARNED. Raises MissingExtraError without matplotlib, before any work.
     """
     check_optional("matplotlib", "a picture")
     with whole_folder(Path(out), OWNED) as folder:
@@ -61,12 +76,14 @@ def run_demo(out: Path | str, *, scale: str = "small", seed: int = 0, progress: 
         dictionary.save(folder / "words.npz")
         write_tokens(tokens_of(descriptors, dictionary), DictionarySet.of(dictionary), folder / "tokens")
         log.info("Training language models and recognising run 3")
-        beliefs = {way: _recognise(folder, *way) for way in product(SMOOTHINGS, ORDERS)}
+        beliefs = {} if as_in_paper else {LEARNED: _learned(folder, descriptors, training, seed)}
+        beliefs |= {way: _recognise(folder, *way) for way in product(SMOOTHINGS, ORDERS)}
         results = {way: evaluate(found) for way, found in beliefs.items()}
+        best = BEST if as_in_paper else LEARNED
         _contact_sheet(_typical_frames(sequences), folder / "laboratory.png")
         words = word_table(descriptors.take(~training), dictionary)
         draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title="The words of run 3")
-        plot_evaluation(beliefs[BEST], results[BEST], folder / "beliefs.png")
+        plot_evaluation(beliefs[best], results[best], folder / "beliefs.png")
         write_text(
             folder / "report.html", _report(folder, results, words, len(descriptors.frames), _commands(scale, seed))
         )
@@ -80,10 +97,25 @@ def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
     corpus = read_corpus([path for path in files if not path.stem.endswith(TEST_RUN)], selection=options.select)
     model = folder / "models" / f"{smoothing}-{order}"
     train_model(corpus.sentences, corpus.vocabulary, model, options=options, record=corpus.record)
+    tests = [read_stream(path) for path in files if path.stem.endswith(TEST_RUN)]
+    return _decoded(model, tests, folder / "beliefs" / f"{smoothing}-{order}")
+
+
+def _learned(folder: Path, descriptors: Descriptors, training: Mask, seed: int) -> list[Beliefs]:
+    """Learn from runs 1 and 2 as `placerec learn` does, and decode run 3."""
+    model = ModelFolder(folder / "model")
+    model.path.mkdir()
+    train, test = descriptors.take(training), descriptors.take(~training)
+    learn_folder(model, train.values, train.table, train.spec, DictionarySetOptions(seed=seed), ModelOptions())
+    streams = tokens_of(test, DictionarySet.load(model.words))
+    return _decoded(model.path, streams, folder / "beliefs" / LEARNED[0])
+
+
+def _decoded(model: Path, streams: Sequence[WordStream], out: Path) -> list[Beliefs]:
     recognizer = load_recognizer(model)
-    beliefs = [recognizer.decode(read_stream(path)) for path in files if path.stem.endswith(TEST_RUN)]
+    beliefs = [recognizer.decode(stream) for stream in streams]
     for found in beliefs:
-        write_beliefs(folder / "beliefs" / f"{smoothing}-{order}" / f"{found.name}.tsv", found)
+        write_beliefs(out / f"{found.name}.tsv", found)
     return beliefs
 
 
@@ -94,11 +126,14 @@ def format_results(results: DemoResults) -> str:
         f"Synthetic laboratory, {majority.frames} test frames of {len(majority.sequences)} sequences: frames right",
         f"  {majority.majority_accuracy:6.1%}  always {majority.majority_place} (the majority class)",
     ]
-    lines += [
-        f"  {found.accuracy:6.1%}  {smoothing}, n = {order}{_note(order)}"
-        for (smoothing, order), found in results.items()
-    ]
+    lines += [f"  {found.accuracy:6.1%}  {_title(way)}, n = {way[1]}{_note(way[1])}" for way, found in results.items()]
     return "\n".join(lines)
+
+
+def _title(way: tuple[str, int]) -> str:
+    if way == LEARNED:
+        return "four dictionaries, their weight learned (placerec learn)"
+    return f"as in the paper: {way[0]}"
 
 
 def _note(order: int) -> str:
@@ -162,7 +197,7 @@ def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, c
         picture(
             folder / "beliefs.png",
             "Belief over places for each test sequence, and the confusion matrix",
-            "Witten-Bell, n = 2, on the six synthetic test sequences.",
+            f"{_title(next(iter(results)))}, n = 2, on the six synthetic test sequences.",
         ),
         heading("Everything between is text"),
         paragraph("A token stream, one word per frame (tokens/seq4_cloudy3.tsv):"),
@@ -180,14 +215,25 @@ def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, c
 def _results_table(results: DemoResults) -> str:
     majority = results[BEST]
     rows: list[Sequence[object]] = [
-        (f"always {majority.majority_place} (majority class)", None, f"{majority.majority_accuracy:.1%}", None, None)
+        (
+            f"always {majority.majority_place} (majority class)",
+            None,
+            f"{majority.majority_accuracy:.1%}",
+            None,
+            None,
+            None,
+        )
     ]
-    for (smoothing, order), found in results.items():
+    for way, found in results.items():
         latency = None if found.change_latency_frames is None else f"{found.change_latency_frames:g}"
-        name = f"{smoothing}{_note(order)}"
-        rows.append((name, order, f"{found.accuracy:.1%}", f"{found.balanced_accuracy:.1%}", latency))
+        name = f"{_title(way)}{_note(way[1])}"
+        loss = f"{found.log_loss:.2f}"
+        rows.append((name, way[1], f"{found.accuracy:.1%}", f"{found.balanced_accuracy:.1%}", loss, latency))
     return table(
-        ("Models", "n", "Frames right", "Mean recall of places", "Frames until right after a change (median)"),
+        (
+            *("Models", "n", "Frames right", "Mean recall of places", "Log loss"),
+            "Frames until right after a change (median)",
+        ),
         rows,
         f"{majority.frames} synthetic test frames, the third run of each path and light; runs 1 and 2 trained.",
     )
@@ -216,5 +262,7 @@ def _commands(scale: str, seed: int) -> str:
             "placerec train-lm tokens/*[12].tsv --as-in-paper -o model/ --order 2",
             "placerec decode tokens/*3.tsv -m model/ -o beliefs/",
             "placerec evaluate beliefs/*.tsv --plot beliefs.png",
+            "",
+            f"placerec learn lab/ -o learned/ --seed {seed} $(printf -- '--test %s ' lab/seq*{TEST_RUN})",
         ]
     )

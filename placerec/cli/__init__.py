@@ -15,8 +15,10 @@ from placerec.errors import PlacerecError
 from placerec.version import __version__
 
 EPILOG = """\b
-Your own images, in five commands:
-  placerec train-words RUNS/ -o words.npz
+Your own images, in one command:
+  placerec learn RUNS/ -o model/ --test RUNS/run3
+The same step by step:
+  placerec train-words RUNS/run1 RUNS/run2 -o words.npz
   placerec tokenize RUNS/ -w words.npz -o tokens/
   placerec train-lm tokens/run1.tsv tokens/run2.tsv -o model/
   placerec decode tokens/run3.tsv -m model/ -o beliefs/

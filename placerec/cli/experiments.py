@@ -102,16 +102,17 @@ def lab(out: Path, scale: str, seed: int) -> None:
 
 @click.command(epilog="Example: placerec demo")
 @shared.output_option("demo/", "The folder to write.  [default: demo/]", required=False)
-@shared.seed_option("Seed of the laboratory and the map.")
+@shared.seed_option("Seed of the laboratory and the maps.")
+@click.option("--as-in-paper", is_flag=True, help="Show the paper's systems alone.")
 @shared.talk_options
-def demo(out: Path | None, seed: int) -> None:
+def demo(out: Path | None, seed: int, as_in_paper: bool) -> None:
     """Run all of it on the synthetic laboratory.
 
-    Images, words, models and beliefs, and at the end a page to look at.
+    Images, words, models and beliefs, by `placerec learn` and as in the paper, and at the end a page to look at.
     """
     from placerec.demo import format_results, run_demo
 
     out = out or Path("demo")
-    results = run_demo(out, seed=seed, progress=shared.progress_bar)
+    results = run_demo(out, seed=seed, as_in_paper=as_in_paper, progress=shared.progress_bar)
     click.echo(format_results(results))
     shared.log.info("\nNow open %s", out / "report.html")
