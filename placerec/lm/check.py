@@ -69,7 +69,8 @@ def context_sums(model: BackoffModel) -> Iterator[tuple[int, Ints, Floats]]:
 
     <s> is not predicted and left out; the empty context comes first, as row 0 of order 0.
     """
-    word_p = [np.power(10.0, log10_p.astype(np.float64)) for log10_p in model.log10_probs]
+    with np.errstate(over="ignore"):
+        word_p = [np.power(10.0, log10_p.astype(np.float64)) for log10_p in model.log10_probs]
     start = model.trie.vocabulary.index.get("<s>", -1)
     if start >= 0:
         word_p[0][start] = 0.0

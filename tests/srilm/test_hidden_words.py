@@ -169,3 +169,22 @@ def test_nothing_to_read_is_nothing_to_do(folder: Path) -> None:
     for tool in TOOLS:
         assert call(tool, "-text", "empty", "-lm", "m.lm", "-posteriors") == (0, "", "")
         assert call(tool, "-text-map", "empty", "-lm", "m.lm", "-continuous") == (0, "", "")
+
+
+@pytest.mark.parametrize("weight", [["-mapw", "0"], ["-lmw", "nan"]])
+def test_what_cannot_be_stays_impossible_whatever_it_weighs(weight: list[str], folder: Path) -> None:
+    Path("zero.map").write_text("f1 room 0\n")
+    Path("one.txt").write_text("f1\n")
+    found = call("disambig", "-map", "zero.map", "-text", "one.txt", "-lm", "m.lm", "-write-counts", "c", *weight)
+    assert found == (0, "", "one.txt: line 1: Disambiguation failed\n")
+
+
+def test_a_text_that_repeats_itself_is_decoded_line_by_line_as_alone(folder: Path) -> None:
+    lines = ["f1 f2 f1", "f2", "f1 f1 f2 f9", "f1 f2 f1"]
+    Path("all.txt").write_text("".join(f"{line}\n" for line in lines))
+    arguments = ["disambig", "-map", "m.map", "-lm", "m.lm", "-order", "3", "-fb", "-posteriors", "-text"]
+    alone = ""
+    for line in lines:
+        Path("alone.txt").write_text(f"{line}\n")
+        alone += call(*arguments, "alone.txt")[1]
+    assert call(*arguments, "all.txt")[1] == alone

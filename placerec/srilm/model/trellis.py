@@ -7,7 +7,8 @@ in which states were found, as SRILM's tools form them: the last printed digits 
 
 import math
 from collections.abc import Sequence
-from functools import reduce
+from dataclasses import dataclass
+from functools import cached_property, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,8 @@ from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.logs import LN10
 
 
-class Step(NamedTuple):
+@dataclass(frozen=True)
+class Step:
     """The transitions into the states of a position: from the states of the one before, `costs` (A, S) float32.
 
     `targets` int64 (A, S): the state that each leads to. `labels` int64 (n,): what each state says, by a number.
@@ -26,6 +28,18 @@ class Step(NamedTuple):
     costs: Singles
     targets: Ints
     labels: Ints
+
+    @cached_property
+    def turns(self) -> Ints:
+        """Which transitions lead to each state, one after the other: places in the flat arrays, (turns, n).
+
+        Behind the last place is what fills the columns of states that fewer transitions lead to.
+        """
+        targets = self.targets.ravel()
+        turn = _turns(targets)
+        places = np.full((int(turn.max(initial=-1)) + 1, len(self.labels)), len(targets))
+        places[turn, targets] = np.arange(len(targets))
+        return places
 
 
 class Path(NamedTuple):
@@ -51,33 +65,34 @@ def forward(steps: Sequence[Step], *, summed: bool) -> list[Singles]:
     """Per position (the start is one) the log10 p of each state: of the best way there, or of all ways together."""
     scores = [np.zeros(1, np.float32)]
     for step in steps:
-        totals = (scores[-1] + step.costs).ravel()
-        scores.append(_gathered(totals, step.targets.ravel(), len(step.labels), summed=summed))
+        totals = np.append((scores[-1] + step.costs).ravel(), np.float32(-np.inf))[step.turns]
+        scores.append(_gathered(totals, summed=summed))
     return scores
 
 
 def backward(steps: Sequence[Step], *, summed: bool) -> list[Singles]:
     """Per position (the start is one) the log10 p of what follows each state: of the best way on, or of all ways."""
-    size = len(steps[-1].labels) if steps else 1
-    scores = [np.zeros(size, np.float32)]
+    scores = [np.zeros(len(steps[-1].labels) if steps else 1, np.float32)]
     for step in reversed(steps):
-        totals = (scores[-1][step.targets] + step.costs).ravel()
-        sources = np.tile(np.arange(step.costs.shape[1]), len(step.costs))
-        scores.append(_gathered(totals, sources, step.costs.shape[1], summed=summed))
+        scores.append(_gathered(scores[-1][step.targets] + step.costs, summed=summed))
     return scores[::-1]
 
 
-def _gathered(totals: Singles, targets: Ints, size: int, *, summed: bool) -> Singles:
-    """The largest of the totals of each target, or the log10 of the sum of what they are logarithms of: (size,)."""
-    gathered = np.full(size, -np.inf, np.float32)
-    if not summed:
-        np.maximum.at(gathered, targets, totals)
-        return gathered
-    turns = _turns(targets)
-    for turn in range(int(turns.max(initial=-1)) + 1):
-        now = turns == turn
-        at = targets[now]
-        gathered[at] = _log10_sum(gathered[at].astype(np.float64), totals[now].astype(np.float64))
+def _gathered(totals: Singles, *, summed: bool) -> Singles:
+    """The largest of each column of logarithms (k, n), or the logarithm of the sum, from the first row to the last."""
+    if not summed or not len(totals):
+        best: Singles = totals.max(axis=0, initial=-np.inf)
+        return best
+    gathered: Singles = totals[0]
+    for row in totals[1:]:
+        more = np.maximum(gathered, row).astype(np.float64)
+        less = np.minimum(gathered, row).astype(np.float64)
+        less -= more
+        less *= LN10
+        total = more + np.log10(1 + np.exp(less))
+        if np.isnan(total).any():
+            total[np.isneginf(more)] = -np.inf
+        gathered = total.astype(np.float32)
     return gathered
 
 
@@ -88,14 +103,6 @@ def _turns(targets: Ints) -> Ints:
     turns = np.empty(len(targets), np.int64)
     turns[order] = np.arange(len(targets)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
     return turns
-
-
-def _log10_sum(a: Floats, b: Floats) -> Floats:
-    """log10 of the sum of what `a` and `b`, float64, are the logarithms of."""
-    more, less = np.maximum(a, b), np.minimum(a, b)
-    with np.errstate(invalid="ignore"):
-        total: Floats = more + np.log10(1 + np.exp((less - more) * LN10))
-    return np.where(np.isneginf(less), more, total)
 
 
 def total_log10_p(scores: NDArray[Any]) -> float:

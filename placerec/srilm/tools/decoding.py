@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from placerec.arrays import Floats
+from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.logs import LN10
 from placerec.srilm.model.scorers import Scorer
 from placerec.srilm.model.trellis import (
@@ -27,6 +27,7 @@ from placerec.srilm.tools import ngram
 from placerec.srilm.tools.ngram_models import Models
 from placerec.srilm.tools.options import Option, Options, Parsed
 
+_MOST_KEPT = 4096
 _MODEL = ("lm", "mix-lm", "lambda", *(f"mix-{what}{k}" for k in range(2, 10) for what in ("lm", "lambda")))
 OPTIONS: Options = {
     "text": Option("string", None, "the text to decode"),
@@ -119,7 +120,7 @@ def _decode(options: Parsed, observed: Observed, steps: list[Step], printed: Pri
     if printed.counted:
         printed.counted(observed, steps)
     if options["posteriors"]:
-        for word, shares in zip(observed.words, shares_of(steps, options), strict=True):
+        for word, shares in zip(observed.words, shares_of(steps, options, scores), strict=True):
             shown = shares if options["logmap"] else {label: p_of(share) for label, share in shares.items()}
             streams.print(printed.place(word, shown))
     elif options["totals"]:
@@ -129,9 +130,17 @@ def _decode(options: Parsed, observed: Observed, steps: list[Step], printed: Pri
             streams.print(f"NBEST_{k} {path.log10_p:g} {printed.path(observed, path.labels)}\n")
     else:
         best = best_path(steps, scores)
-        labels = decided(shares_of(steps, options)) if by_share(options) or best is None else best.labels
+        labels = decided(shares_of(steps, options, scores)) if by_share(options) or best is None else best.labels
         start = f"NBEST_0 {total:g} " if options["nbest"] > 1 else ""
         streams.print(f"{start}{printed.path(observed, labels)}\n")
+
+
+def costs_of(paid: Floats, weight: float, local: Floats) -> Singles:
+    """The costs float32 (A, S): what the model asks (A, S), and the weighted log10 p of a map (A,); never nan."""
+    costs = (paid + weight * local[:, None]).astype(np.float32)
+    # A weight of 0 does not make possible what is not.
+    costs[np.isnan(costs)] = -np.inf
+    return costs
 
 
 def by_share(options: Parsed) -> bool:
@@ -144,9 +153,14 @@ def decided(shares: Sequence[dict[int, float]]) -> list[int]:
     return [max(share, key=share.__getitem__) for share in shares]
 
 
-def shares_of(steps: Sequence[Step], options: Parsed) -> list[dict[int, float]]:
-    """log10 of how probable each label is, position by position: over all paths with -fb, else over the best ones."""
-    return [label_shares(joint, step.labels) for joint, step in zip(joints(steps, options), steps, strict=True)]
+def shares_of(
+    steps: Sequence[Step], options: Parsed, scores: Sequence[Singles] | None = None
+) -> list[dict[int, float]]:
+    """log10 of how probable each label is, position by position: over all paths with -fb, else over the best ones.
+
+    `scores`: what `forward` gives for these options, if it is there already.
+    """
+    return [label_shares(joint, step.labels) for joint, step in zip(joints(steps, options, scores), steps, strict=True)]
 
 
 def state_shares(steps: Sequence[Step], options: Parsed) -> list[Floats]:
@@ -154,13 +168,32 @@ def state_shares(steps: Sequence[Step], options: Parsed) -> list[Floats]:
     return [joint - total_log10_p(joint) for joint in joints(steps, options)]
 
 
-def joints(steps: Sequence[Step], options: Parsed) -> list[Floats]:
+def joints(steps: Sequence[Step], options: Parsed, scores: Sequence[Singles] | None = None) -> list[Floats]:
     """log10 p of the ways through each state, position by position."""
-    summed = by_share(options)
-    before, behind = forward(steps, summed=summed), backward(steps, summed=summed)
-    if options.values.get("fw-only"):
-        behind = [np.zeros_like(scores) for scores in behind]
+    summed, alone = by_share(options), bool(options.values.get("fw-only"))
+    before = scores if scores is not None and not alone else forward(steps, summed=summed)
+    behind = [np.zeros_like(its) for its in before] if alone else backward(steps, summed=summed)
     return [joint_log10_p(a, b, summed=summed) for a, b in zip(before[1:], behind[1:], strict=True)]
+
+
+class StepCache:
+    """The steps of a text that were made before, by what leads to them: streams of frames repeat themselves."""
+
+    def __init__(self, options: Parsed) -> None:
+        # Maps of single positions do not repeat, and what is told of a step is told each time.
+        self.used = not options["text-map"] and options["debug"] < 2
+        self.kept: dict[tuple[int, bytes, bool], tuple[Step, Ints]] = {}
+
+    def step(self, word: int, contexts: Ints, first: bool, make: Callable[[], tuple[Step, Ints]]) -> tuple[Step, Ints]:
+        """The step of a word (by a number) behind contexts (S,), and the contexts of the states there."""
+        if not self.used:
+            return make()
+        key = word, contexts.tobytes(), first
+        if key not in self.kept:
+            if len(self.kept) >= _MOST_KEPT:
+                self.kept.clear()
+            self.kept[key] = make()
+        return self.kept[key]
 
 
 def p_of(log10_p: float) -> float:

@@ -1,6 +1,7 @@
 """`disambig`: the hidden words behind the words of a text, by a map and a language model."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from placerec.srilm.text.vocabulary import WordList, format_words, read_aliases
 from placerec.srilm.tools import decoding
 from placerec.srilm.tools.decoding import (
     Printed,
+    StepCache,
+    costs_of,
     decode_all,
     language_model,
     observed_text,
@@ -44,7 +47,9 @@ _NEVER = np.float32(-100)
 def disambig(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
     """Run `disambig` with these arguments; returns the exit status."""
     options = parse(tool, OPTIONS, arguments, streams)
-    _Run(options, streams).run()
+    # Log 0 is infinite.
+    with np.errstate(all="ignore"):
+        _Run(options, streams).run()
     return 0
 
 
@@ -64,17 +69,15 @@ class _Run:
             self.map.read_classes(options["classes"], streams)
         scorer = language_model(options, self.hidden, streams)
         self.histories = Histories(scorer, max(1, options["order"]))
+        self.cache = StepCache(options)
         self.counts: dict[int, dict[int, int]] = {}
-        self.unigrams: dict[int, float] = {}
 
     def run(self) -> None:
         """Decode, then write what is to be written."""
         options = self.options
-        # Log 0 is infinite.
-        with np.errstate(all="ignore"):
-            counted = self.count if options["write-counts"] else None
-            printed = Printed(self.shown_path, self.shown_place, counted)
-            decode_all(options, self.sources(), self.steps, printed, self.streams)
+        counted = self.count if options["write-counts"] else None
+        printed = Printed(self.shown_path, self.shown_place, counted)
+        decode_all(options, self.sources(), self.steps, printed, self.streams)
         if options["write-counts"]:
             self.streams.write(options["write-counts"], self.format_counts())
         if options["write-vocab1"]:
@@ -105,18 +108,22 @@ class _Run:
         steps: list[Step] = []
         contexts: Ints = np.zeros(1, np.int64)
         for i, choices in enumerate(observed.choices):
-            hidden = list(choices)
-            log10_p, behind = self.histories.after(contexts, hidden, remembered=True)
-            log10_p = np.where(np.isneginf(log10_p), _NEVER, log10_p)
-            local = self.local(choices)
-            paid = self.options["lmw"] * log10_p.astype(np.float64) if i else np.zeros(log10_p.shape)
-            costs = (paid + self.options["mapw"] * local[:, None]).astype(np.float32)
-            if i and self.options["debug"] >= 2:
-                self.tell(i, contexts, behind, log10_p, local)
-            targets, contexts = numbered_states(behind)
-            labels = np.array([self.histories.contexts[context][-1] for context in contexts.tolist()], np.int64)
-            steps.append(Step(costs, targets, labels))
+            step, contexts = self.cache.step(id(choices), contexts, not i, partial(self.step, i, choices, contexts))
+            steps.append(step)
         return steps
+
+    def step(self, i: int, choices: Choices, contexts: Ints) -> tuple[Step, Ints]:
+        """Position number i behind contexts (S,), and the contexts of the states there, which end in hidden words."""
+        log10_p, behind = self.histories.after(contexts, list(choices), remembered=True)
+        log10_p = np.where(np.isneginf(log10_p), _NEVER, log10_p)
+        local = self.local(choices)
+        if i and self.options["debug"] >= 2:
+            self.tell(i, contexts, behind, log10_p, local)
+        paid = self.options["lmw"] * log10_p.astype(np.float64) if i else np.zeros(log10_p.shape)
+        costs = costs_of(paid, self.options["mapw"], local)
+        targets, found = numbered_states(behind)
+        labels = np.array([self.histories.contexts[context][-1] for context in found.tolist()], np.int64)
+        return Step(costs, targets, labels), found
 
     def local(self, choices: Choices) -> Floats:
         """log10 of what the map gives the choices, float64 of float32 values (A,)."""

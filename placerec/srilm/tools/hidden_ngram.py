@@ -1,6 +1,7 @@
 """`hidden-ngram`: the events between the words of a text, by a language model of words and events."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,16 @@ from placerec.srilm.text.sentences import Handling
 from placerec.srilm.text.streams import Streams, exit_status, tokens
 from placerec.srilm.text.vocabulary import WordList, read_aliases, read_words
 from placerec.srilm.tools import decoding, ngram
-from placerec.srilm.tools.decoding import Printed, decode_all, language_model, observed_text, p_of, state_shares
+from placerec.srilm.tools.decoding import (
+    Printed,
+    StepCache,
+    costs_of,
+    decode_all,
+    language_model,
+    observed_text,
+    p_of,
+    state_shares,
+)
 from placerec.srilm.tools.options import Option, Options, Parsed, parse
 
 TOOL = "hidden-ngram"
@@ -35,7 +45,9 @@ _NOTHING = -1
 def hidden_ngram(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
     """Run `hidden-ngram` with these arguments; returns the exit status."""
     options = parse(tool, OPTIONS, arguments, streams)
-    _Run(options, streams).run()
+    # Log 0 is infinite.
+    with np.errstate(all="ignore"):
+        _Run(options, streams).run()
     return 0
 
 
@@ -58,17 +70,16 @@ class _Run:
             self.events[_NOTHING] = self.sure
         scorer = language_model(options, self.words, streams)
         self.histories = Histories(scorer, max(1, options["order"]), -np.inf)
+        self.cache = StepCache(options)
         self.costly = np.float32(options["unk-prob"])
         self.counts: dict[tuple[int, ...], float] = {}
 
     def run(self) -> None:
         """Decode, then write what is to be written."""
         options = self.options
-        # Log 0 is infinite.
-        with np.errstate(all="ignore"):
-            counted = self.count if options["write-counts"] else None
-            printed = Printed(self.shown_path, self.shown_place, counted)
-            decode_all(options, self.sources(), self.steps, printed, self.streams)
+        counted = self.count if options["write-counts"] else None
+        printed = Printed(self.shown_path, self.shown_place, counted)
+        decode_all(options, self.sources(), self.steps, printed, self.streams)
         if options["write-counts"]:
             self.streams.write(options["write-counts"], self.format_counts())
 
@@ -97,25 +108,32 @@ class _Run:
         self.states: list[list[int]] = []
         contexts: Ints = np.zeros(1, np.int64)
         names = [""]
-        for i, (word, events) in enumerate(zip(observed.words, observed.choices, strict=True)):
-            word_p, event_p, behind = self.transitions(contexts, self.words.known(word), events, first=i == 0)
-            local = self.local(events)
-            paid = self.options["lmw"] * (word_p.astype(np.float64) + event_p.astype(np.float64))
-            costs = (paid + self.options["mapw"] * local[:, None]).astype(np.float32)
-            labels = np.array(list(events), np.int64)
-            # Without an event the context alone does not tell that there was none.
-            keys = 2 * behind + (labels == _NOTHING)[:, None]
-            targets, found = numbered_states(keys.T)
-            targets = targets.T
-            of_state = np.where(found % 2, _NOTHING, [self.last(context) for context in (found // 2).tolist()])
-            if self.options["debug"] >= 2:
-                after = [self.shown(int(key)) for key in found.tolist()]
-                self.tell(i, names, after, targets, self.name(self.words.known(word)), (word_p, event_p, local))
-                names = after
-            steps.append(Step(costs, targets, of_state.astype(np.int64)))
-            contexts = found // 2
+        for i, (name, events) in enumerate(zip(observed.words, observed.choices, strict=True)):
+            word = self.words.known(name)
+            make = partial(self.step, i, word, events, contexts, names)
+            step, contexts = self.cache.step(word, contexts, not i, make)
+            steps.append(step)
             self.states.append(contexts.tolist())
+            if self.options["debug"] >= 2:
+                names = list(map(self.shown, step.labels.tolist(), contexts.tolist()))
         return steps
+
+    def step(self, i: int, word: int, events: Choices, contexts: Ints, names: Sequence[str]) -> tuple[Step, Ints]:
+        """Position number i behind states with contexts (S,), called `names`; and the contexts of the states there."""
+        word_p, event_p, behind = self.transitions(contexts, word, events, first=not i)
+        local = self.local(events)
+        paid = self.options["lmw"] * (word_p.astype(np.float64) + event_p.astype(np.float64))
+        costs = costs_of(paid, self.options["mapw"], local)
+        # Without an event the context alone does not tell that there was none.
+        keys = 2 * behind + (np.array(list(events), np.int64) == _NOTHING)[:, None]
+        targets, found = numbered_states(keys.T)
+        after: Ints = found // 2
+        last = np.array([self.histories.contexts[context][-1] for context in after.tolist()], np.int64)
+        step = Step(costs, targets.T, np.where(found % 2, _NOTHING, last))
+        if self.options["debug"] >= 2:
+            shown = list(map(self.shown, step.labels.tolist(), after.tolist()))
+            self.tell(i, names, shown, step.targets, self.name(word), (word_p, event_p, local))
+        return step, after
 
     def transitions(self, contexts: Ints, word: int, events: Choices, *, first: bool) -> tuple[Singles, Singles, Ints]:
         """log10 p of a word after contexts (S,), of the events behind it (A, S), and the contexts then (A, S)."""
@@ -140,19 +158,14 @@ class _Run:
         local = values if self.options["logmap"] else np.log10(values)
         return local.astype(np.float32).astype(np.float64)
 
-    def last(self, context: int) -> int:
-        """The most recent word of a context."""
-        words = self.histories.contexts[context]
-        return words[-1] if words else _NOTHING
-
     def name(self, number: int) -> str:
         """What a word or an event is called."""
         return NO_EVENT if number == _NOTHING else str(self.words.words[number])
 
-    def shown(self, key: int) -> str:
+    def shown(self, label: int, context: int) -> str:
         """A state: the words of the context, the most recent first, behind the word for no event if there is none."""
-        words = [self.name(word) for word in self.histories.contexts[key // 2][::-1]]
-        return " ".join([NO_EVENT, *words] if key % 2 else words)
+        words = [self.name(word) for word in self.histories.contexts[context][::-1]]
+        return " ".join([NO_EVENT, *words] if label == _NOTHING else words)
 
     def tell(
         self,
