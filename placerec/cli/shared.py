@@ -249,7 +249,8 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
             from placerec.frames.sequence import SourceOptions
 
             settings = {field.name: options.pop(field.name) for field in fields(SourceOptions) if field.name in options}
-            with usage("--labels"):
+            end = settings["end"]
+            with usage("--labels" if end is None or settings["begin"] < end else "--to"):
                 source_options = SourceOptions(format_, **settings)
             return function(*args, source_options=source_options, **options)
 

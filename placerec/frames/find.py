@@ -1,13 +1,8 @@
-"""From what the user names to sequences: folders are searched, layouts told apart, names made unique.
-
-A list on standard input (`-`): the path of an image a line, optionally followed by TAB seconds, and TAB place.
-"""
+"""From what the user names to sequences: folders are searched, layouts told apart, names made unique."""
 
 import logging
-import math
 import os
 import re
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -15,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from placerec.errors import SourceError, at
+from placerec.errors import SourceError
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
 from placerec.frames.folder import EMPTY, WANTED, FileFrames, Listing, is_text, list_folder, natural_key, read_frames
-from placerec.frames.intervals import Intervals, checked_seconds, find_intervals
+from placerec.frames.image_list import LIST_NAME, STDIN, read_list
+from placerec.frames.intervals import Intervals, find_intervals
 from placerec.frames.layouts import (
     ABOVE_CAMERAS,
     BELOW_CAMERA,
@@ -37,9 +33,9 @@ from placerec.frames.layouts import (
     room_in,
 )
 from placerec.frames.naming import own_name, unique_names
-from placerec.frames.places import check_place, check_twins, checked_place
+from placerec.frames.places import check_place, check_twins
 from placerec.frames.recordings import WANTED as RECORDED, is_recording, read_recording
-from placerec.frames.sequence import Frame, Sequence, SourceOptions
+from placerec.frames.sequence import Sequence, SourceOptions
 from placerec.frames.table import Labels
 from placerec.frames.times import find_times_list, is_stamped, part_of
 
@@ -52,7 +48,6 @@ SPLITS = frozenset({"train", "training", "val", "valid", "validation", "test"})
 # Folders that are called so hold runs, whatever is in them, and are no places.
 RUN_NAME = re.compile(r"(?i)(seq|sequence|run|drive|tour|traj|trajectory|session|scan|cam|camera|image)s?[-_ ]?\d*")
 STREAM = Path("-")
-LIST_NAME, STDIN = "stdin", "<stdin>"
 
 
 @dataclass(frozen=True)
@@ -96,10 +91,11 @@ def find_sequences(
             raise SourceError(f"{item.folder}: its name is not UTF-8, or holds a tab or a line end; rename it")
     own = [LIST_NAME if item.folder == STREAM else own_name(item.folder) for item in found]
     names = unique_names([(name, item.folder) for name, item in zip(own, found, strict=True)], SourceError)
-    takers = list(filter(_is_recorded, found)) or list(filter(_is_unlabelled, found))
+    takes = _is_recorded if any(map(_is_recorded, found)) else _is_unlabelled
     others = replace(options, labels=None) if one_file else options
+    alone = sum(map(takes, found)) == 1
     read = [
-        _read(item, name, options if item in takers else others, alone=len(takers) == 1)
+        _read(item, name, options if takes(item) else others, alone=alone)
         for name, item in zip(names, found, strict=True)
     ]
     check_twins(chain.from_iterable(positions for _, positions in read))
@@ -115,12 +111,8 @@ def _read(
     """
     where: Iterable[tuple[str, str]] = ()
     if item.folder == STREAM:
-        listed, where = _read_list()
-        times = np.array([frame.time for frame in listed])
-        if options.rate is not None and np.isnan(times).all():
-            times = np.arange(len(listed)) / options.rate
-            listed = tuple(replace(frame, time=time) for frame, time in zip(listed, times.tolist(), strict=True))
-        part = part_of(times, options.begin, options.end, STDIN)
+        listed, where = read_list(options.rate)
+        part = part_of(np.array([frame.time for frame in listed]), options.begin, options.end, STDIN)
         return Sequence(name, listed[part][:: options.every], item.folder), where
     if item.listing.unread:
         log.warning("%s: not read: %s", item.camera, item.listing.unread)
@@ -364,43 +356,3 @@ def _check_twice(found: list[_Found]) -> None:
 def _absolute(path: Path) -> Path:
     # Not resolve(): a link keeps the name that the user gave it.
     return Path(os.path.abspath(path))
-
-
-def _read_list() -> tuple[tuple[Frame, ...], list[tuple[str, str]]]:
-    """The frames of a list, called as it calls them, and every place with the line that names it.
-
-    Frames are in the order of their seconds, without any in that of the lines. Raises SourceError naming the line: no
-    number, seconds in some lines alone, a name that cannot be a place's, a file named twice; and for an empty list.
-    """
-    if sys.stdin is None:
-        raise SourceError("`-`: reads standard input, and that is closed")
-    lines: dict[str, int] = {}
-    frames: list[Frame] = []
-    # As bytes: a file's name need not be UTF-8.
-    for number, line in enumerate(sys.stdin.buffer, start=1):
-        text = os.fsdecode(line).rstrip("\r\n")
-        if text.strip():
-            frame = _listed_frame(number, text)
-            first = lines.setdefault(frame.name, number)
-            if first != number:
-                raise SourceError(at(STDIN, number, f"{frame.name} is named in line {first} already; remove one"))
-            if frames and math.isnan(frame.time) != math.isnan(frames[0].time):
-                raise SourceError(at(STDIN, number, "some lines have seconds and others do not; give all or none"))
-            frames.append(frame)
-    if not frames:
-        raise SourceError(f"{STDIN}: names no image; give the path of an image a line")
-    positions = [(frame.place, f"{STDIN}:{lines[frame.name]}") for frame in frames if frame.place]
-    if not math.isnan(frames[0].time):
-        frames.sort(key=lambda frame: frame.time)
-    return tuple(frames), positions
-
-
-def _listed_frame(number: int, text: str) -> Frame:
-    path, *more = text.split("\t")
-    if not is_text(path):
-        raise SourceError(at(STDIN, number, f"the name {os.fsencode(path)!r} is not UTF-8; rename the file"))
-    if len(more) > 2 or not path or "\0" in path:
-        raise SourceError(at(STDIN, number, f"{text!r} is not 'path [TAB seconds [TAB place]]'"))
-    seconds, place = (*more, "", "")[:2]
-    time = checked_seconds(STDIN, number, seconds) if seconds else math.nan
-    return Frame(path, time, place and checked_place(STDIN, number, place), Path(path))

@@ -95,7 +95,8 @@ class SourceOptions:
         if self.label_clock not in CLOCKS:
             raise SourceError(f"label clock {self.label_clock!r} is not known; choose one of {', '.join(CLOCKS)}")
         if not (0 <= self.begin < (inf if self.end is None else self.end)):
-            raise SourceError(f"from {self.begin:g} to {self.end} seconds is no part of a run; give 0 <= from < to")
+            end = "the end" if self.end is None else f"{self.end:g}"
+            raise SourceError(f"from {self.begin:g} to {end} seconds is no part of a run; give 0 <= from < to")
         if self.rate is not None and not 0 < self.rate < inf:
             raise SourceError(f"a rate of {self.rate:g} frames a second is not possible; give one above 0")
         if self.every < 1:

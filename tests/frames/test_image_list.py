@@ -79,3 +79,16 @@ def test_it_can_be_named_once_and_must_be_open(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("sys.stdin", None)
     with pytest.raises(SourceError, match="reads standard input, and that is closed"):
         find_sequences(["-"])
+
+
+def test_a_rate_gives_times_and_a_part_is_cut_by_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    def listed(text: str, **options: float) -> list[tuple[str, float]]:
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+        (sequence,) = find_sequences(["-"], options=SourceOptions(**options))  # type: ignore[arg-type]
+        return [(frame.name, frame.time) for frame in sequence.frames]
+
+    assert listed("b\na\nc\n", rate=4) == [("b", 0), ("a", 0.25), ("c", 0.5)]
+    assert listed("b\na\nc\n", rate=4, begin=0.25) == [("a", 0.25), ("c", 0.5)]
+    assert listed("b\t7\na\t9\n", rate=4, end=1) == [("b", 7)]
+    with pytest.raises(SourceError, match="<stdin>: its frames have no times, by which --from and --to go"):
+        listed("b\na\n", end=1)
