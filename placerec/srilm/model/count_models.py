@@ -64,7 +64,7 @@ class CountModel:
         p = np.full(len(levels[0].count), np.float64(1) / np.float64(self.size))
         for k, level in enumerate(levels):
             weight = self.weights[self.row(level.context), k]
-            p = np.where(level.there, level.part(weight) + (1 - weight) * p, p)
+            p = np.where(level.there, weight * level.ratio + (1 - weight) * p, p)
         return p
 
     def __call__(self, sequence: TokenSequence) -> "CountView":
@@ -79,11 +79,11 @@ class Level:
     context: Floats
     there: Mask
 
-    def part(self, weight: Floats | float) -> Floats:
-        """A weight (m,) times the relative frequency, which is 0 in a context that was never seen."""
-        seen = self.context > 0
-        part: Floats = np.where(seen, weight * self.count / np.where(seen, self.context, 1), 0.0)
-        return part
+    @property
+    def ratio(self) -> Floats:
+        """The relative frequency (m,); 0 in a context that was never seen."""
+        ratio: Floats = np.where(self.context > 0, self.count / np.where(self.context > 0, self.context, 1), 0.0)
+        return ratio
 
 
 class CountView:

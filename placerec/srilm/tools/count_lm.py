@@ -57,14 +57,16 @@ class _Expected(NamedTuple):
 
 
 def _samples(model: CountModel, counts: NgramCounts, first: FirstSeen) -> _Samples:
-    """The n-grams whose last word is predicted with as much context as there is, in the order of SRILM's walk."""
+    """The n-grams whose last word is predicted with as much context as there is, order by order in SRILM's walk."""
     words, trie = model.words, counts.trie
     numbers = words.numbers(trie.vocabulary)
     events = event_mask(words)
     matrices = [numbers[trie.matrix(n)] for n in range(1, counts.order + 1)]
     ids: list[int] = []
     lengths, times = [], []
-    for n, row in zip(*(column.tolist() for column in first.walk(counts)), strict=True):
+    orders, rows = first.walk(counts)
+    by_order = np.argsort(orders, kind="stable")
+    for n, row in zip(orders[by_order].tolist(), rows[by_order].tolist(), strict=True):
         ngram, count = matrices[n - 1][row].tolist(), counts.counts[n - 1][row]
         # Shorter ones than the longest stand at the beginning of sentences.
         whole = n == model.order or (n < model.order and ngram[0] == words.index[SENTENCE_START])
@@ -91,7 +93,7 @@ def _expected(model: CountModel, samples: _Samples) -> _Expected:
     for k in range(len(levels) - 1, -1, -1):
         there = np.flatnonzero(levels[k].there & (mixed[k] > 0))
         row = model.row(levels[k].context[there])
-        share = model.weights[row, k] * levels[k].part(1.0)[there] / mixed[k][there]
+        share = model.weights[row, k] * levels[k].ratio[there] / mixed[k][there]
         np.add.at(taken[:, k], row, left[there] * share)
         np.add.at(total[:, k], row, left[there])
         left[there] *= 1 - share
