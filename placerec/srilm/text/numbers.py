@@ -34,6 +34,12 @@ def leading_float(text: str) -> float | None:
         return -math.inf if match[1].startswith("-") else math.inf
 
 
+def whole_float(text: str) -> float | None:
+    """The number that a text is, as C's strtod reads it to the end; None if there is more or less to the text."""
+    match = re.fullmatch(rf"{_SPACE}[-+]?(?:{_HEXADECIMAL}|{_DECIMAL}|inf(?:inity)?|nan)", text, re.IGNORECASE)
+    return leading_float(text) if match else None
+
+
 _MOST_DIGITS = 1000
 _SPACE = r"[ \t\n\v\f\r]*"
 _HEXADECIMAL = r"0x(?:[0-9a-f]+\.?[0-9a-f]*|\.[0-9a-f]+)(?:p[-+]?[0-9]+)?"

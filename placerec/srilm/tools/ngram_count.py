@@ -112,8 +112,8 @@ def _run(options: Parsed, streams: Streams) -> None:
         raise SrilmError("maxent model estimation not supported (requires liblbfgs)", 2)
     if given_method(options, "")[1] > 1:
         raise SrilmError("conflicting default discounting options", 2)
-    words = _read_vocabulary(options, streams)
-    counts, first = _read_all(options, words, streams)
+    words = read_vocabulary(options, streams)
+    counts, first = read_all(options, words, streams)
     if options["order"] < 1:
         streams.say("LM order must be positive -- set to 1")
     if options["count-lm"] and options["lm"] is not None:
@@ -137,7 +137,8 @@ def _run(options: Parsed, streams: Streams) -> None:
     _write_rest(options, fitter.counts, words, first, streams)
 
 
-def _read_vocabulary(options: Parsed, streams: Streams) -> WordList:
+def read_vocabulary(options: Parsed, streams: Streams) -> WordList:
+    """The words that the options name."""
     words = WordList(lower=options["tolower"], open_unknown=options["unk"], meta_tag=options["meta-tag"])
     if options["map-unk"]:
         words.map_unknown(options["map-unk"])
@@ -151,7 +152,7 @@ def _read_vocabulary(options: Parsed, streams: Streams) -> WordList:
     return words
 
 
-def _read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[NgramCounts, FirstSeen]:
+def read_all(options: Parsed, words: WordList, streams: Streams) -> tuple[NgramCounts, FirstSeen]:
     """All counts, and what tells the order in which n-grams were first seen."""
     order, fractional = options["order"], options["float-counts"]
     limited = options["limit-vocab"]

@@ -18,6 +18,9 @@ TOOLS = (
     "add-ppls",
     "disambig",
     "hidden-ngram",
+    "ngram-class",
+    "replace-words-with-classes",
+    "uniform-classes",
 )
 _INTERRUPTED = 130
 
