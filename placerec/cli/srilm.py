@@ -19,6 +19,9 @@ _PURPOSES = {
     "add-ppls": "SRILM's tool: add up ngram -ppl outputs.",
     "disambig": "SRILM's tool: find hidden words behind words.",
     "hidden-ngram": "SRILM's tool: find events between words.",
+    "ngram-class": "SRILM's tool: make classes of words.",
+    "replace-words-with-classes": "SRILM's tool: classes for words in text.",
+    "uniform-classes": "SRILM's tool: equal shares within classes.",
 }
 
 
@@ -31,6 +34,9 @@ EXAMPLES = {
     "add-ppls": "monday.ppl tuesday.ppl",
     "disambig": "-map frames.map -text frames.txt -lm places.lm",
     "hidden-ngram": "-text stream.txt -lm events.lm -hidden-vocab events.txt",
+    "ngram-class": "-text train.txt -numclasses 50 -classes words.classes",
+    "replace-words-with-classes": "classes=words.classes train.txt",
+    "uniform-classes": "words.classes",
 }
 
 

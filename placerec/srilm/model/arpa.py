@@ -76,14 +76,18 @@ def tables_of(model: MutableModel, words: WordList) -> ScoreTables:
     return model.tables(words.numbers(model.trie.vocabulary), len(words.words))
 
 
-def write_model(model: MutableModel, name: str, streams: Streams, debug: int) -> None:
-    """Write a model as an ARPA file, as it is: an n-gram's first words need not be listed, weights may be nan."""
+def write_model(model: MutableModel, name: str, streams: Streams, debug: int, *, behind: str = "") -> None:
+    """Write a model as an ARPA file, as it is: an n-gram's first words need not be listed, weights may be nan.
+
+    `behind`: what to write after the model.
+    """
     if debug >= 1:
         for n, stored in enumerate(model.stored, start=1):
             streams.say(f"writing {int(stored.sum())} {n}-grams")
     with streams.output(name) as file:
         columns = model.log10_p, model.backoff, model.is_context
         file.writelines(row_blocks(model.trie, *columns, stored=model.stored, encoding="latin-1"))
+        file.write(behind.encode("latin-1"))
 
 
 def _weights(model: MutableModel, blocks: Sequence[tuple[int, Block]], rows: Sequence[Sequence[Ints]]) -> list[Ints]:

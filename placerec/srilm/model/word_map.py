@@ -8,6 +8,7 @@ import numpy as np
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.order.hashing import table_order
 from placerec.srilm.text.numbers import leading_float
+from placerec.srilm.text.classes_file import split_expansion
 from placerec.srilm.text.streams import Lines, SrilmError, Streams, tokens
 from placerec.srilm.text.vocabulary import WordList
 
@@ -72,10 +73,7 @@ class WordMap:
         """Read classes of single words, `CLASS [P] w` a line: a word stands for the classes that have it (-classes)."""
         lines = streams.lines(name)
         for line in lines:
-            hidden, *words = tokens(line)
-            value = leading_float(words[0]) if words else None
-            if value is not None:
-                del words[0]
+            hidden, value, words = split_expansion(tokens(line))
             if len(words) != 1:
                 streams.say(f"{lines.position}class definition must have exactly one word")
                 raise SrilmError("format error in classes file")

@@ -1,10 +1,12 @@
 """Classes files: lines `CLASS [P] w1 w2 ...`; section T1 of our specification of SRILM's tools."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import dropwhile, islice
 from typing import NamedTuple
 
 from placerec.srilm.text.numbers import whole_float
-from placerec.srilm.text.streams import Lines, Streams, tokens
+from placerec.srilm.text.streams import Lines, SrilmError, Streams, tokens
 
 NO_WORDS = "class expansion contains no words"
 
@@ -23,11 +25,25 @@ def split_expansion(fields: Sequence[str]) -> Expansion:
     return Expansion(fields[0], p, tuple(fields[1 if p is None else 2 :]))
 
 
-def read_expansions(lines: Lines, streams: Streams) -> Iterator[Expansion]:
-    """The expansions in a file's lines; a line without words is reported and left out."""
-    for line in lines:
+def read_expansions(lines: Lines, streams: Streams, *, behind_model: bool = False) -> Iterator[Expansion]:
+    """The expansions in a file's lines; one without words is reported, and ends the file.
+
+    `behind_model`: they follow an ARPA model's `\\end\\`. Raises SrilmError for what is no probability.
+    """
+    found: Iterable[str] = lines
+    if behind_model:
+        found = islice(dropwhile(lambda line: not line.startswith("\\end\\"), lines), 1, None)
+    for line in found:
         expansion = split_expansion(tokens(line))
-        if expansion.words:
-            yield expansion
-        else:
+        if not expansion.words:
             streams.say(f"{lines.position}{NO_WORDS}")
+            return
+        if expansion.p is not None and not 0 <= expansion.p < math.inf:
+            raise SrilmError(f"{lines.position}class probability {expansion.p:g}: a number of at least 0 is needed")
+        yield expansion
+
+
+def format_expansions(expansions: Iterable[Expansion]) -> str:
+    """Lines `CLASS P words`, sorted by their bytes."""
+    ordered = sorted(expansions, key=lambda expansion: (expansion.name, " ".join(expansion.words)))
+    return "".join(f"{name} {1.0 if p is None else p:.16f} {' '.join(words)}\n" for name, p, words in ordered)

@@ -79,10 +79,10 @@ OPTIONS: Options = {
     "write-lm": Option("string", None, "write the model"),
     "write-vocab": Option("string", None, "write all words"),
     **_refuse("mixture tables are not specified", read_mix_lms="flag", context_priors="string"),
-    **_refuse(
-        "class models are not specified",
-        classes="string", expand_classes="unsigned", expand_exact="unsigned", simple_classes="flag",
-    ),
+    "classes": Option("string", None, "what classes of words stand for"),
+    "simple-classes": Option("flag", False, "each word is of one class at most, and classes stand for single words"),
+    "expand-classes": Option("unsigned", None, "make a model of words, of n-grams of so many words at most (0: any)"),
+    "expand-exact": Option("unsigned", 0, "compute exact probabilities of n-grams of so many words or more (0: none)"),
     **_refuse(
         "hidden-event models are not specified",
         hidden_vocab="string", hidden_not="flag", hiddens="string", df="flag", stop_words="string", hmm="flag",

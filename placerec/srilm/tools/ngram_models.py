@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import cache, partial
+from typing import cast
 
 import numpy as np
 
@@ -11,13 +12,16 @@ from placerec.lm.mutable import MutableModel, reweigh, unite
 from placerec.lm.prune import prune, prune_improbable
 from placerec.lm.score import TokenSequence
 from placerec.srilm.model.arpa import read_model, tables_of, write_model
+from placerec.srilm.model.class_scorers import Definitions
 from placerec.srilm.model.count_models import CountModel, format_count_model, read_count_model
 from placerec.srilm.model.mixed_scorers import Cached, Lenient, LogLinear, Mixture
 from placerec.srilm.model.scorers import Model, Null, Scorer
 from placerec.srilm.order.contexts import ContextTimes, merged_times, message_order
 from placerec.srilm.order.messages import Messages
+from placerec.srilm.text.classes_file import format_expansions
 from placerec.srilm.text.streams import SrilmError, Streams
 from placerec.srilm.text.vocabulary import WordList
+from placerec.srilm.tools.ngram_classes import expand_classes, read_definitions, with_classes
 from placerec.srilm.tools.options import Parsed
 
 
@@ -34,6 +38,7 @@ class Models:
         # When the model's contexts were made: worth finding only where the order of messages asks for it.
         self.times: Callable[[], ContextTimes] | None = None
         self.counted: CountModel | None = None
+        self.definitions: Definitions | None = None
 
     def scorer(self) -> Scorer:
         """What scores: sections 9.2 to 9.6, in this order."""
@@ -53,12 +58,14 @@ class Models:
         """The back-off model of -lm, and what is mixed with it."""
         self.mutable, times = self.read("lm", "lm file")
         self.times = lambda: times
+        if self.options["classes"]:
+            self.definitions = read_definitions(self.options, self.words, self.streams)
         return self.mixed()
 
     def counting(self) -> Scorer:
         """The count model of -lm (-count-lm)."""
         options, name = self.options, self.options["lm"]
-        for other in ("mix-lm", "renorm", "prune", "prune-lowprobs", "skipoovs"):
+        for other in ("mix-lm", "classes", "renorm", "prune", "prune-lowprobs", "skipoovs"):
             if options[other]:
                 raise SrilmError(f"-{other} needs a back-off model; leave it or -count-lm out", 2)
         failure, limited = f"format error in count-lm file{name}", options["limit-vocab"]
@@ -118,11 +125,14 @@ class Models:
         self.change()
         # SRILM's dynamic mixtures do not hand -skipoovs down.
         back = min(2, self.order - 1) if options["skipoovs"] and not (dynamic and others) else None
-        model = Model(partial(tables_of, self.model(), self.words), self.words, back)
+        model = self.classed(Model(partial(tables_of, self.model(), self.words), self.words, back))
         if not dynamic or not others:
             return model
         mutables = [self.read(option, "mix-lm file")[0] for option in others]
-        models = [model, *(Model(partial(tables_of, mutable, self.words), self.words) for mutable in mutables)]
+        more = [self.classed(Model(partial(tables_of, mutable, self.words), self.words)) for mutable in mutables]
+        if self.definitions is not None and (options["loglinear-mix"] or options["bayes"] > 0):
+            raise SrilmError("with -classes only -bayes 0 mixes models while scoring", 2)
+        models = cast(list[Model], [model, *more])
         self.mutable = None
         if options["loglinear-mix"]:
             return partial(LogLinear, models, weights, self.words, self.debug, {})
@@ -147,6 +157,10 @@ class Models:
 
         return cache(found)
 
+    def classed(self, model: Model) -> Scorer:
+        """A model over the classes that -classes defines, or the model itself if there are none."""
+        return model if self.definitions is None else with_classes(model, self.definitions, self.options)
+
     def model(self) -> MutableModel:
         """The model that was read; there is one wherever this is called."""
         assert self.mutable is not None
@@ -160,6 +174,9 @@ class Models:
             least = options["minbackoff"]
             reweigh(mutable, self.messages(mutable), minimum=least if least is not None and 0 <= least <= 1 else None)
             self.mutable = mutable
+        if self.definitions is not None and options["expand-classes"] is not None:
+            self.mutable = expand_classes(self.model(), self.definitions, options, self.words, self.messages)
+            self.definitions, self.times = None, None
         if options["prune"] > 0:
             history = None
             if options["prune-history-lm"]:
@@ -214,4 +231,7 @@ class Models:
             self.streams.say("write() method not implemented")
             self.streams.say(f"error writing {name}")
             return
-        write_model(mutable, name, self.streams, self.debug)
+        behind = ""
+        if self.definitions is not None:
+            behind = f"\n{format_expansions(self.definitions.expansions(self.words))}\n"
+        write_model(mutable, name, self.streams, self.debug, behind=behind)
