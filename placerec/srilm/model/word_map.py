@@ -7,8 +7,8 @@ import numpy as np
 
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.order.hashing import table_order
-from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.classes_file import split_expansion
+from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import Lines, SrilmError, Streams, tokens
 from placerec.srilm.text.vocabulary import WordList
 

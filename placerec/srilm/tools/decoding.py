@@ -55,7 +55,8 @@ def language_model(options: Parsed, words: WordList, streams: Streams) -> Scorer
     defaults = {name: option.default for name, option in ngram.OPTIONS.items()}
     own = {name: value for name, value in options.values.items() if name in defaults and name != "unk-prob"}
     length = options["bayes"] if options["bayes"] is not None else max(1, options["order"]) - 1
-    return Models(Parsed({**defaults, **own, "bayes": length}), words, streams).scorer()
+    # Classes are the map's, if any.
+    return Models(Parsed({**defaults, **own, "bayes": length, "classes": None}), words, streams).scorer()
 
 
 def observed_text(
