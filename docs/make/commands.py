@@ -50,7 +50,7 @@ PYTHON = {
     "demo": "",
 }
 # Those with a table of options on docs/srilm.md.
-TABLED = ("ngram-count", "ngram", "ngram-merge", "disambig", "hidden-ngram")
+TABLED = ("ngram-count", "ngram", "ngram-merge", "disambig", "hidden-ngram", "ngram-class")
 COMMON = {"quiet", "verbose", "help"}
 
 

@@ -9,7 +9,7 @@ import pytest
 from placerec.srilm.tools.options import Options
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/srilm.md"
-TABLED = ("ngram-count", "ngram", "ngram-merge", "disambig", "hidden-ngram")
+TABLED = ("ngram-count", "ngram", "ngram-merge", "disambig", "hidden-ngram", "ngram-class")
 
 
 def options_of(tool: str) -> Options:
