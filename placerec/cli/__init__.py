@@ -34,6 +34,10 @@ class Failure(click.ClickException):
         click.echo(f"placerec: {line}", file=file, err=True)
 
 
+# Columns for the names of commands in the list of them.
+_NAMES = 17
+
+
 class Commands(click.Group):
     """The one place where what goes wrong becomes a line on stderr and an exit code."""
 
@@ -55,6 +59,15 @@ class Commands(click.Group):
             raise Failure(f"{error.filename or 'standard output'}: {error.strerror or error}") from error
         except MemoryError as error:
             raise Failure(f"not enough memory ({error}); give less at a time") from error
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """All commands, a line each; the few with long names have their line for themselves."""
+        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            width = formatter.width
+            formatter.write_dl(
+                [(name, command.get_short_help_str(width)) for name, command in commands if command], col_max=_NAMES
+            )
 
 
 @click.group(

@@ -54,7 +54,7 @@ def test_the_list_of_commands_is_not_cut_off() -> None:
     text = done("--help").stdout
     assert "..." not in text.partition("Commands:")[2].partition("Your own images")[0]
     for name in commands.commands:
-        assert re.search(rf"^  {name} +[A-Z].*\.$", text, re.MULTILINE), name
+        assert re.search(rf"^  {name}(\n  )? +[A-Z].*\.$", text, re.MULTILINE), name
 
 
 @pytest.mark.parametrize("name", NAMES)
