@@ -139,6 +139,8 @@ def stream(data: list[bytes], format: str) -> list[Message]:
         ("libx264", "h264", {"tune": "zerolatency", "g": "5"}),
         ("libx265", "hevc", {"x265-params": "bframes=0:keyint=5:log-level=none"}),
         ("libsvtav1", "AV1", {"svtav1-params": "pred-struct=1"}),
+        ("libvpx", "vp8", {"deadline": "realtime", "lag-in-frames": "0"}),
+        ("libvpx-vp9", "vp9", {"deadline": "realtime", "lag-in-frames": "0"}),
     ],
 )
 def test_a_video_in_the_messages_of_a_bag(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from placerec.errors import SourceError
 from placerec.frames import Frame, SourceOptions, find_sequences, images_at
 from placerec.frames.sequence import Gray
-from placerec.frames.video import SUFFIXES, _decoded, _increasing, _walked, list_times
+from placerec.frames.video import SUFFIXES, Video, _decoded, _increasing, _walked, list_times
 
 # A container and a codec; MPEG-2 is written with B-frames, whose order in the file is not that in time.
 KINDS = [
@@ -315,6 +315,19 @@ def encoded(path: Path, codec: str, pixels: str = "yuv420p", **options: str) -> 
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
         container.mux(stream.encode())
     return path
+
+
+@pytest.mark.parametrize(
+    ("name", "codec"),
+    [("run.mp4", "libx264"), ("run.mkv", "libx265"), ("run.webm", "libvpx-vp9"), ("run.m2ts", "libx264")],
+)
+def test_codecs_that_opencv_reads_and_does_not_write(tmp_path: Path, name: str, codec: str) -> None:
+    options = {"x265-params": "log-level=none"} if codec == "libx265" else {}
+    path = encoded(tmp_path / name, codec, **options)
+    sequence = find_one(path)
+    assert type(sequence.recording) is Video
+    assert np.allclose([frame.time for frame in sequence.frames], np.arange(20) / 10, atol=1e-3)
+    assert equal(read_images(sequence), decoded(path))
 
 
 @pytest.mark.parametrize(("name", "codec"), [("run.h264", "libx264"), ("run.265", "libx265")])
