@@ -188,3 +188,17 @@ def test_a_text_that_repeats_itself_is_decoded_line_by_line_as_alone(folder: Pat
         Path("alone.txt").write_text(f"{line}\n")
         alone += call(*arguments, "alone.txt")[1]
     assert call(*arguments, "all.txt")[1] == alone
+
+
+def test_classes_of_single_words_are_seen_through(folder: Path) -> None:
+    Path("c.classes").write_text("room 0.25 bed\nroom 0.75 bath\n")
+    Path("words.txt").write_text("bed bath hall hall\n")
+    arguments = ["hidden-ngram", "-lm", "m.lm", "-hidden-vocab", "e.txt", "-text"]
+    _, plain, _ = call(*arguments, "w.txt", "-nbest", "2")
+    status, out, err = call(*arguments, "words.txt", "-nbest", "2", "-classes", "c.classes", "-simple-classes")
+    assert (status, err) == (0, "")
+    assert out.count("bed") == 2
+    best, other = (re.findall(r"NBEST_\d (-[\d.]+)", text) for text in (plain, out))
+    # The first word costs nothing, so only the second word's share of the class is there.
+    assert [float(p) for p in other] == pytest.approx([float(p) + math.log10(0.75) for p in best], abs=1e-5)
+    assert call(*arguments, "words.txt", "-classes", "c.classes")[0] == 2

@@ -6,6 +6,7 @@ import numpy as np
 
 from placerec.arrays import Ints, Singles
 from placerec.lm.score import TokenSequence
+from placerec.srilm.model.class_scorers import SimpleClasses
 from placerec.srilm.model.mixed_scorers import Mixture
 from placerec.srilm.model.scorers import ModelView, Scorer, View
 
@@ -69,6 +70,8 @@ class Histories:
 
 def _used(view: View) -> Ints:
     """How many words before each word the model or any of its parts can use, int64 (T,)."""
+    if isinstance(view, SimpleClasses):
+        return _used(view.view)
     views = view.views if isinstance(view, Mixture) else [view]
     lengths = [part.contexts.lengths for part in views if isinstance(part, ModelView)]
     longest: Ints = np.max(lengths, axis=0)

@@ -48,15 +48,17 @@ OPTIONS: Options = {
 }
 
 
-def language_model(options: Parsed, words: WordList, streams: Streams) -> Scorer | None:
-    """The model that -lm and its sisters name; None without -lm. Mixtures are always mixed while scoring."""
+def language_model(options: Parsed, words: WordList, streams: Streams, *, kept: Sequence[str] = ()) -> Scorer | None:
+    """The model that -lm and its sisters name; None without -lm. Mixtures are always mixed while scoring.
+
+    `kept`: options that mean something else to the decoder than to `ngram`.
+    """
     if options["lm"] is None:
         return None
     defaults = {name: option.default for name, option in ngram.OPTIONS.items()}
-    own = {name: value for name, value in options.values.items() if name in defaults and name != "unk-prob"}
+    own = {name: value for name, value in options.values.items() if name in defaults and name not in kept}
     length = options["bayes"] if options["bayes"] is not None else max(1, options["order"]) - 1
-    # Classes are the map's, if any.
-    return Models(Parsed({**defaults, **own, "bayes": length, "classes": None}), words, streams).scorer()
+    return Models(Parsed({**defaults, **own, "bayes": length}), words, streams).scorer()
 
 
 def observed_text(

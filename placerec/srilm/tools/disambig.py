@@ -67,7 +67,7 @@ class _Run:
             self.map.read(options["map"], streams)
         if options["classes"]:
             self.map.read_classes(options["classes"], streams)
-        scorer = language_model(options, self.hidden, streams)
+        scorer = language_model(options, self.hidden, streams, kept=("classes",))
         self.histories = Histories(scorer, max(1, options["order"]))
         self.cache = StepCache(options)
         self.counts: dict[int, dict[int, int]] = {}

@@ -11,7 +11,7 @@ from placerec.srilm.model.histories import Histories
 from placerec.srilm.model.trellis import Step, numbered_states
 from placerec.srilm.model.word_map import Choices, Observed, WordMap, read_positions
 from placerec.srilm.text.sentences import Handling
-from placerec.srilm.text.streams import Streams, exit_status, tokens
+from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.text.vocabulary import WordList, read_aliases, read_words
 from placerec.srilm.tools import decoding, ngram
 from placerec.srilm.tools.decoding import (
@@ -30,7 +30,7 @@ TOOL = "hidden-ngram"
 OPTIONS: Options = {
     "order": Option("unsigned", 3, "largest n-gram length that is read and used"),
     "hidden-vocab": Option("string", None, "the events"),
-    **{name: ngram.OPTIONS[name] for name in ("vocab", "limit-vocab", "tolower")},
+    **{name: ngram.OPTIONS[name] for name in ("vocab", "limit-vocab", "tolower", "classes", "simple-classes")},
     "force-event": Option("flag", False, "there is an event behind every word"),
     "unk-prob": Option("float", -100.0, "log10 of what words of probability 0 cost"),
     "fw-only": Option("flag", False, "position by position what is most probable, by what came before"),
@@ -55,6 +55,8 @@ class _Run:
     """One run: the words, the events, the model, and the expected counts."""
 
     def __init__(self, options: Parsed, streams: Streams) -> None:
+        if options["classes"] and not options["simple-classes"]:
+            raise SrilmError("-classes needs -simple-classes here: classes of several words are not supported", 2)
         self.options, self.streams = options, streams
         self.words = WordList(lower=options["tolower"], open_unknown=options["keep-unk"])
         if options["vocab"]:
@@ -68,7 +70,7 @@ class _Run:
             self.events = {self.words.add(tokens(line)[0]): self.sure for line in lines if tokens(line)}
         if not options["force-event"] or not self.events:
             self.events[_NOTHING] = self.sure
-        scorer = language_model(options, self.words, streams)
+        scorer = language_model(options, self.words, streams, kept=("unk-prob",))
         self.histories = Histories(scorer, max(1, options["order"]), -np.inf)
         self.cache = StepCache(options)
         self.costly = np.float32(options["unk-prob"])
