@@ -57,7 +57,7 @@ def language_model(options: Parsed, words: WordList, streams: Streams, *, kept: 
         return None
     defaults = {name: option.default for name, option in ngram.OPTIONS.items()}
     own = {name: value for name, value in options.values.items() if name in defaults and name not in kept}
-    length = options["bayes"] if options["bayes"] is not None else max(1, options["order"]) - 1
+    length = options["bayes"] if options["bayes"] is not None else max(1, options["order"])
     return Models(Parsed({**defaults, **own, "bayes": length}), words, streams).scorer()
 
 

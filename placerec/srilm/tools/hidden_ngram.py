@@ -146,7 +146,10 @@ class _Run:
         real = [event for event in events if event != _NOTHING]
         rows = np.flatnonzero(np.array(list(events)) != _NOTHING)
         if real:
-            its_p, behind[rows] = self.histories.after(after[0], real, remembered=True)
+            # Mixtures weigh the models by what stands before an event, however much of it the models use.
+            known = self.histories.contexts
+            whole = [self.histories.number((*known[context], word)) for context in contexts.tolist()]
+            its_p, behind[rows] = self.histories.after(np.array(whole, np.int64), real, remembered=True)
             event_p[rows] = self.at_cost(its_p)
         return word_p, event_p, behind
 
