@@ -96,8 +96,8 @@ class Evidence:
             return weighted(self.alpha, first)
         total = np.zeros(first.shape)
         for own in self.own:
-            total += np.nan_to_num(weighted(self.alpha, own), nan=0.0, neginf=-np.inf)
-        return total
+            total += np.nan_to_num(own, nan=0.0, neginf=-np.inf)
+        return weighted(self.alpha, total)
 
     @property
     def updates(self) -> Ints:

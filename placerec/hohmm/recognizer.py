@@ -4,6 +4,7 @@ import logging
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
+from operator import add
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
@@ -141,8 +142,8 @@ class Recognizer(SequenceDecoder):
         for row in own:
             # nan is not equal to itself.
             if row[0] == row[0]:
-                total = [sum_ + alpha * p for sum_, p in zip(total, row, strict=True)]
-        return total
+                total = list(map(add, total, row))
+        return [alpha * p for p in total]
 
     def _posterior(self, possible: bool) -> Posterior:
         probability = self._filter.belief()
