@@ -309,9 +309,9 @@ def _numbered(vocabularies: Mapping[str, Collection[str]]) -> dict[str, int]:
     """The number of each word's dictionary; ModelError for a word of two."""
     number: dict[str, int] = {}
     for d, (name, words) in enumerate(vocabularies.items()):
-        for word in words:
-            if number.setdefault(word, d) != d:
-                raise ModelError(f"the word {word!r} of the dictionary {name!r} is one of another, too; rename it")
+        if twice := number.keys() & words:
+            raise ModelError(f"the word {min(twice)!r} of the dictionary {name!r} is one of another, too; rename it")
+        number |= dict.fromkeys(words, d)
     return number
 
 
