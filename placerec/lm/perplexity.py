@@ -9,6 +9,8 @@ from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import EPSILON, LN10
 
 TOP_RANKS = (1, 5, 10)
+# From here on, exp ends.
+_LARGEST = 308.0
 
 
 class Totals(NamedTuple):
@@ -106,7 +108,8 @@ def rank_word(
 
     `marker`: a </s>, perhaps within a sentence, which is counted among the words there, but not for its rank.
     """
-    p = math.exp(log10_p * LN10)
+    # Not numpy's: all digits of the losses are printed.
+    p = math.inf if log10_p > _LARGEST else math.exp(log10_p * LN10)
     place = rank(p, np.exp(everyone.astype(np.float64) * LN10))
     leading = tuple(weight * (place < top) for top in TOP_RANKS)
     # What over-full models give too much of is no loss.

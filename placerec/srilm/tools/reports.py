@@ -38,16 +38,18 @@ def _rank_lines(ranks: Ranks) -> str:
     words = [_ratio(count, ranks.words) if ranks.words else "0" for count in ranks.leading_words]
     tokens = [_ratio(count, ranks.tokens) for count in ranks.leading]
     square = ranks.square / ranks.tokens if ranks.tokens else 0.0
+    # As pow has it; negative weights may leave less than nothing.
+    root = "-nan" if square < 0 else shown(square**0.5, 16)
     return (
         f"{ranks.words:.16g} words, rank1= {words[0]} rank5= {words[1]} rank10= {words[2]}\n"
         f"{ranks.tokens:.16g} words+sents, rank1wSent= {tokens[0]} rank5wSent= {tokens[1]} rank10wSent= {tokens[2]}"
-        f" qloss= {square**0.5:.16g} absloss= {_ratio(ranks.absolute, ranks.tokens)}\n"
+        f" qloss= {root} absloss= {_ratio(ranks.absolute, ranks.tokens)}\n"
     )
 
 
 def _ratio(part: float, whole: float) -> str:
     # What C's 0.0 / 0.0 prints.
-    return f"{part / whole:.16g}" if whole else "-nan"
+    return shown(part / whole, 16) if whole else "-nan"
 
 
 class Printer:
