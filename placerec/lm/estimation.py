@@ -1,5 +1,6 @@
 """From counts to a back-off model, with SRILM's arithmetic: section 6 of our SRILM specification."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ from placerec.errors import LanguageModelError, refuse_string
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import NgramCounts
 from placerec.lm.discounts import Context, Rule
-from placerec.lm.logs import EPSILON, log10, log10_of_sum, p_of
+from placerec.lm.logs import EPSILON, LN10, log10, log10_of_sum, p_of
 from placerec.lm.mutable import SILENT, MutableModel, Trace, insert_prefixes, weigh_contexts
 from placerec.lm.smoothings import Smoothing
 from placerec.lm.trie import Trie, per_context, runs
@@ -288,6 +289,12 @@ def _attempt(
     p = np.where(mixed, part + weight * p_of(lower), part)
     log10_p = log10_of_sum(p, [lower], [np.where(mixed, weight, 0)], start=part) if mixed.any() else log10(p)
     kept = factor != 0
+    if trace.every_attempt and mixed.any():
+        # What these contexts leave is told: next to nothing, where the exp of numpy and of the C library differ.
+        spent = per_context(group[kept], len(total), p[kept])
+        told = np.flatnonzero(mixed & (spent > 1 - EPSILON)[group])
+        exact = [math.exp(one * LN10) for one in lower[told].tolist()]
+        p[told] = part[told] + weight[told] * np.array(exact)
     trace.probabilities(
         order.n,
         attempt,
