@@ -67,8 +67,8 @@ def test_srilms_answers_to_odd_models(shared: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_what_is_refused_and_what_is_warned_of(run: Run) -> None:
-    assert run("-lm m.lm -classes x")[0] == 2
-    assert "-classes" in run("-lm m.lm -classes x")[2]
+    assert run("-lm m.lm -factored")[0] == 2
+    assert "-factored" in run("-lm m.lm -factored")[2]
     assert run("-lm m.lm -frobnicate") == (
         0,
         "",
