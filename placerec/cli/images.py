@@ -22,7 +22,7 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
     """Write the descriptor of every frame.
 
     SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
-    folder of images (any, or laid out as in COLD, KTH-IDOL2 or VPC), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
+    folder of images (any, or as in COLD, KITTI, EuRoC and others), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
     folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
     """
     from placerec.vision import describe_sources
@@ -114,7 +114,7 @@ def train_words(sources: tuple[Path, ...], out: Path, words: "DictionarySetOptio
     """Learn visual words: PCA and maps of descriptors.
 
     SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
-    folder of images (any, or laid out as in COLD, KTH-IDOL2 or VPC), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
+    folder of images (any, or as in COLD, KITTI, EuRoC and others), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
     folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
     """
     from placerec.vision import train_dictionary
@@ -134,7 +134,7 @@ def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> N
     """Write the visual word of every frame.
 
     SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
-    folder of images (any, or laid out as in COLD, KTH-IDOL2 or VPC), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
+    folder of images (any, or as in COLD, KITTI, EuRoC and others), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
     folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
     A camera (camera:0, camera:rtsp://...) is recorded until Ctrl-C.
     """

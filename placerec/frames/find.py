@@ -72,7 +72,7 @@ def find_sequences(
 ) -> list[Sequence]:
     """The sequences in `sources`, in the order given, within a source in natural order; no image is decoded.
 
-    A source is a sequence (the layout of COLD, KTH-IDOL2 or VPC, or a folder of images; a video, a bag), a folder of
+    A source is a sequence (a folder of images, in a layout of docs/inputs.md or in none; a video, a bag), a folder of
     sequences, searched downwards, or `-`: a list of image files on standard input. `endless`: it may be a camera
     (`find_camera`), whose frames are known as they come. Raises SourceError for sources without images, labels that
     cannot be used, a sequence given twice, names that stay equal with the parent's name, and MissingExtraError for a

@@ -27,7 +27,7 @@ _UNIT = re.compile(rf"[\[(]({'|'.join(_UNITS)})[\])]")
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)(\.\d+)?")
 _NAME = re.compile(r".+\.[A-Za-z]\w+")
 _NUMBER = re.compile(r"(.*?)(\d+)(?:\.[a-z]+)?\.[^.]+")
-LISTS = ("times.txt", "timestamps.txt", "data.csv")
+_LISTS = ("times.txt", "timestamps.txt")
 
 
 def stamp_in(name: str) -> float | None:
@@ -47,11 +47,13 @@ def find_times_list(images: Path) -> Path | None:
     """The list of times of the images in a folder: within it, or, of a camera's, beside it or in the run."""
     images = Path(images.absolute())
     root = find_camera_root(images)
-    found = [images / name for name in LISTS]
+    found = [images / name for name in _LISTS]
     if root is not None:
         found += [images.with_name(f"{images.name}.txt")]
-        # Between cam0/data/ and the run that cam0/ is a camera of.
-        found += [folder / name for folder in images.parents if folder.is_relative_to(root) for name in LISTS]
+        # Between cam0/data/ and the run that cam0/ is a camera of; a data.csv elsewhere may hold anything.
+        between = [folder for folder in images.parents if folder.is_relative_to(root)]
+        found += [folder / name for folder in between for name in _LISTS]
+        found += [folder / "data.csv" for folder in between if folder != root]
     return next((path for path in found if path.is_file()), None)
 
 

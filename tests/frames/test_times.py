@@ -26,6 +26,24 @@ def test_names_that_are_numbers_since_1970(tmp_path: Path, unit: int) -> None:
     assert times(tmp_path / "run", [f"{round(4 * t) * unit // 4}.png" for t in reversed(stamps)]) == stamps
 
 
+def test_a_list_in_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    for name in ("a.png", "b.png", "c.png"):
+        (tmp_path / "run" / name).touch()
+    # What a table of that name holds is not known.
+    (tmp_path / "run/data.csv").write_text("1.png,kitchen\n")
+    (tmp_path / "run.txt").write_text("notes\n")
+    (sequence,) = find_sequences([tmp_path / "run"])
+    assert all(math.isnan(frame.time) for frame in sequence.frames)
+    (tmp_path / "run/times.txt").write_text("# timestamp [ms]\n\n500\n250\n750.5\n")
+    (sequence,) = find_sequences([tmp_path / "run"])
+    assert [(frame.name, frame.time) for frame in sequence.frames] == [
+        ("b.png", 0.25),
+        ("a.png", 0.5),
+        ("c.png", 0.7505),
+    ]
+
+
 def test_names_that_are_seconds(tmp_path: Path) -> None:
     assert times(tmp_path / "a", ["1305031103.5.png", "1305031102.25.png"]) == [1305031102.25, 1305031103.5]
     assert times(tmp_path / "b", ["t12.5.jpg", "t9.25.jpg"]) == [9.25, 12.5]
