@@ -22,6 +22,15 @@ _PURPOSES = {
     "ngram-class": "SRILM's tool: make classes of words.",
     "replace-words-with-classes": "SRILM's tool: classes for words in text.",
     "uniform-classes": "SRILM's tool: equal shares within classes.",
+    "subtract-ppls": "SRILM's tool: take ngram -ppl outputs from one.",
+    "sort-lm": "SRILM's tool: sort a model's n-grams.",
+    "make-sub-lm": "SRILM's tool: leave out long n-grams.",
+    "get-unigram-probs": "SRILM's tool: a model's words and their p.",
+    "get-gt-counts": "SRILM's tool: counts of counts.",
+    "make-gt-discounts": "SRILM's tool: Good-Turing parameters.",
+    "make-kn-discounts": "SRILM's tool: Kneser-Ney parameters.",
+    "make-abs-discount": "SRILM's tool: an absolute discount.",
+    "make-big-lm": "SRILM's tool: models of many counts.",
 }
 
 
@@ -37,6 +46,15 @@ EXAMPLES = {
     "ngram-class": "-text train.txt -numclasses 50 -classes words.classes",
     "replace-words-with-classes": "classes=words.classes train.txt",
     "uniform-classes": "words.classes",
+    "subtract-ppls": "all.ppl monday.ppl",
+    "sort-lm": "train.lm",
+    "make-sub-lm": "maxorder=2 train.lm",
+    "get-unigram-probs": "linear=1 train.lm",
+    "get-gt-counts": "out=all all.counts",
+    "make-gt-discounts": "min=1 max=7 all.gt2counts",
+    "make-kn-discounts": "min=1 all.gt3counts",
+    "make-abs-discount": "all.gt2counts",
+    "make-big-lm": "-name all -read all.counts -lm all.lm",
 }
 
 

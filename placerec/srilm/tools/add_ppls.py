@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 
+from placerec.lm.perplexity import Totals
 from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 
@@ -19,26 +20,33 @@ def add_ppls(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> in
     """Add up the `file NAME:` blocks of all files and print their total; returns the exit status."""
     if arguments and arguments[0] in ("-help", "-?", "--help", "-h"):
         raise SrilmError(USAGE.format(tool=tool), 0)
-    sentences = words = unknown = zeroprobs = log10_p = 0.0
-    for name in arguments or ["-"]:
+    print_total(totals_of(arguments or ["-"], streams), streams)
+    return 0
+
+
+def totals_of(names: Sequence[str], streams: Streams) -> Totals:
+    """The sum of the `file NAME:` blocks of files."""
+    total = Totals()
+    for name in names:
         inside = False
         for line in streams.lines(name):
             if match := _FIRST.match(line):
-                sentences, words, unknown = (
-                    total + _number(more)
-                    for total, more in zip((sentences, words, unknown), match.groups(), strict=True)
-                )
+                total = total.plus(Totals(*map(_number, match.groups())))
             elif inside and (match := _SECOND.match(line)):
-                zeroprobs += _number(match[1])
-                log10_p += _number(match[2])
+                total = total.plus(Totals(zeroprobs=_number(match[1]), log10_p=_number(match[2])))
             inside = line.startswith("file ")
+    return total
+
+
+def print_total(total: Totals, streams: Streams) -> None:
+    """The block of a total, as scripts read it again."""
+    sentences, words, unknown, zeroprobs, log10_p = total
     streams.print(f"file TOTAL: {_whole(sentences)} sentences, {_whole(words)} words, {_whole(unknown)} OOVs\n")
     if words + sentences > 0:
         scored = words - unknown - zeroprobs
         streams.print(
             f"{_whole(zeroprobs)} zeroprobs, logprob= {log10_p:g} ppl= {_perplexity(log10_p, scored + sentences)}\n"
         )
-    return 0
 
 
 def _number(text: str) -> float:

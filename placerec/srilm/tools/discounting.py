@@ -157,9 +157,7 @@ class Fitter:
         for warning in warnings:
             self.streams.say(warning)
         if choice.file:
-            lines = [f"mincount {int(choice.minimum)}", f"maxcount {len(factors) - 1 if factors else 0}"]
-            lines += [f"discount {k} {factor:.16g}" for k, factor in enumerate(factors or [1.0]) if k]
-            self.streams.write(choice.file, "".join(f"{line}\n" for line in lines))
+            self.streams.write(choice.file, format_good_turing(int(choice.minimum), factors))
         return _good_turing_rule(factors, choice.minimum, choice.interpolate)
 
     def _kneser_ney(self, n: int, choice: Choice) -> Rule:
@@ -181,7 +179,7 @@ class Fitter:
         if min(discounts) < 0:
             raise LanguageModelError("one of modified KneserNey discounts is negative")
         if choice.file:
-            self.streams.write(choice.file, _kneser_ney_file(int(choice.minimum), discounts))
+            self.streams.write(choice.file, format_kneser_ney(int(choice.minimum), discounts))
         if late:
             self.prepare(n)
         return _kneser_ney_rule(discounts, choice.minimum, choice.interpolate)
@@ -252,7 +250,14 @@ def _kneser_ney_rule(discounts: Sequence[float], minimum: float, interpolate: bo
     return Rule(rule, interpolate, minimum)
 
 
-def _kneser_ney_file(minimum: int, discounts: Sequence[float]) -> str:
+def format_good_turing(minimum: int, factors: Sequence[float] | None) -> str:
+    """A Good-Turing parameter file; `factors` for counts 0, 1, ... (None: none)."""
+    lines = [f"mincount {minimum}", f"maxcount {len(factors) - 1 if factors else 0}"]
+    lines += [f"discount {k} {factor:.16g}" for k, factor in enumerate(factors or [1.0]) if k]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def format_kneser_ney(minimum: int, discounts: Sequence[float]) -> str:
     number = ".16g" if len(discounts) == 1 else ".16f"
     lines = [f"{name} {value:{number}}\n" for name, value in zip(_PARAMETERS, discounts, strict=False)]
     return f"mincount {minimum}\n" + "".join(lines)

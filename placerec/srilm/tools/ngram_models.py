@@ -175,8 +175,9 @@ class Models:
             reweigh(mutable, self.messages(mutable), minimum=least if least is not None and 0 <= least <= 1 else None)
             self.mutable = mutable
         if self.definitions is not None and options["expand-classes"] is not None:
+            self.times = None
             self.mutable = expand_classes(self.model(), self.definitions, options, self.words, self.messages)
-            self.definitions, self.times = None, None
+            self.definitions = None
         if options["prune"] > 0:
             history = None
             if options["prune-history-lm"]:
@@ -215,7 +216,7 @@ class Models:
             rows = np.flatnonzero(mutable.stored[n - 1])
             sequence = TokenSequence.of_rows(numbers[mutable.trie.matrix(n)[rows]])
             mutable.log10_p[n - 1][rows] = scorer(sequence).score().log10_p[n - 1 :: n]
-        self.mutable, self.words = mutable, own
+        self.mutable, self.words, self.definitions = mutable, own, None
         reweigh(mutable, self.messages(mutable))
         return Model(partial(tables_of, mutable, own), own)
 

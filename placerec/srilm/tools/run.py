@@ -21,7 +21,23 @@ TOOLS = (
     "ngram-class",
     "replace-words-with-classes",
     "uniform-classes",
+    "subtract-ppls",
+    "sort-lm",
+    "make-sub-lm",
+    "get-unigram-probs",
+    "get-gt-counts",
+    "make-gt-discounts",
+    "make-kn-discounts",
+    "make-abs-discount",
+    "make-big-lm",
 )
+# Small ones that share a module; each of the others has one of its name.
+_TOGETHER = {
+    **dict.fromkeys(("sort-lm", "make-sub-lm", "get-unigram-probs"), "lm_scripts"),
+    **dict.fromkeys(
+        ("get-gt-counts", "make-gt-discounts", "make-kn-discounts", "make-abs-discount"), "discount_scripts"
+    ),
+}
 _INTERRUPTED = 130
 
 
@@ -53,7 +69,7 @@ def _run(tool: str, arguments: Sequence[str], shown: str) -> int:
     name = tool.replace("-", "_")
     streams = Streams(sys.stdin.buffer, sys.stdout.buffer, sys.stderr.buffer)
     try:
-        status = getattr(import_module(f"placerec.srilm.tools.{name}"), name)(
+        status = getattr(import_module(f"placerec.srilm.tools.{_TOGETHER.get(tool, name)}"), name)(
             _latin(arguments), streams, _latin([shown])[0]
         )
         streams.stdout.flush()
