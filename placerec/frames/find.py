@@ -151,11 +151,11 @@ def _not_empty(sequences: list[Sequence], options: SourceOptions) -> list[Sequen
     """Those that have a frame in the part that is asked for; SourceError if none has."""
     some = [sequence for sequence in sequences if len(sequence.frames)]
     part = f"no frame from second {options.begin:g}" + (f" to {options.end:g}" if options.end is not None else "")
+    if sequences and not some:
+        raise SourceError(f"{sequences[0].source}: has {part}; choose another part (--from, --to)")
     for sequence in sequences:
         if not len(sequence.frames):
             log.warning("%s: has %s; left out", sequence.source, part)
-    if sequences and not some:
-        raise SourceError(f"{sequences[0].source}: has {part}; choose another part (--from, --to)")
     return some
 
 
