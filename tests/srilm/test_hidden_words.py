@@ -132,7 +132,6 @@ def test_the_n_best_paths_begin_with_the_best_and_are_all_paths_once() -> None:
     assert len({tuple(path.labels) for path in paths}) == len(paths) == 18
     assert [path.log10_p for path in paths] == sorted((path.log10_p for path in paths), reverse=True)
     best = best_path(steps, forward(steps, summed=False))
-    assert best is not None
     assert best.labels == paths[0].labels
     summed = total_log10_p(forward(steps, summed=True)[-1])
     assert summed == pytest.approx(math.log10(sum(10**path.log10_p for path in paths)), abs=1e-5)

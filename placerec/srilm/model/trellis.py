@@ -83,17 +83,23 @@ def _gathered(totals: Singles, *, summed: bool) -> Singles:
     if not summed or not len(totals):
         best: Singles = totals.max(axis=0, initial=-np.inf)
         return best
-    gathered: Singles = totals[0]
-    for row in totals[1:]:
-        more = np.maximum(gathered, row).astype(np.float64)
-        less = np.minimum(gathered, row).astype(np.float64)
+    impossible = np.isneginf(totals).any()
+    rows = totals.astype(np.float64)
+    gathered = rows[0]
+    for row in rows[1:]:
+        more, less = np.maximum(gathered, row), np.minimum(gathered, row)
+        # In place: the arrays are small, and making them takes as long as what is done to them.
         less -= more
         less *= LN10
-        total = more + np.log10(1 + np.exp(less))
-        if np.isnan(total).any():
-            total[np.isneginf(more)] = -np.inf
-        gathered = total.astype(np.float32)
-    return gathered
+        np.exp(less, out=less)
+        less += 1
+        np.log10(less, out=less)
+        less += more
+        if impossible:
+            less[np.isneginf(more)] = -np.inf
+        gathered = less.astype(np.float32).astype(np.float64)
+    sums: Singles = gathered.astype(np.float32)
+    return sums
 
 
 def _turns(targets: Ints) -> Ints:
@@ -133,10 +139,8 @@ def label_shares(joint: Floats, labels: Ints) -> dict[int, float]:
     return {label: share - total for label, share in shares.items()}
 
 
-def best_path(steps: Sequence[Step], scores: Sequence[Singles]) -> Path | None:
-    """The best path, given the best score of each state; of equal ways to a state the first. None if all have p 0."""
-    if not scores[-1].max(initial=-np.inf) > -np.inf:
-        return None
+def best_path(steps: Sequence[Step], scores: Sequence[Singles]) -> Path:
+    """The best path, given the best score of each state, one of which must not be log 0; of equal ways the first."""
     # Of equal ends the last.
     state = len(scores[-1]) - 1 - int(np.argmax(scores[-1][::-1]))
     labels = []

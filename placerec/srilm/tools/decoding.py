@@ -132,8 +132,8 @@ def _decode(options: Parsed, observed: Observed, steps: list[Step], printed: Pri
         for k, path in enumerate(best_paths(steps, options["nbest"])):
             streams.print(f"NBEST_{k} {path.log10_p:g} {printed.path(observed, path.labels)}\n")
     else:
-        best = best_path(steps, scores)
-        labels = decided(shares_of(steps, options, scores)) if by_share(options) or best is None else best.labels
+        alone = by_share(options)
+        labels = decided(shares_of(steps, options, scores)) if alone else best_path(steps, scores).labels
         start = f"NBEST_0 {total:g} " if options["nbest"] > 1 else ""
         streams.print(f"{start}{printed.path(observed, labels)}\n")
 

@@ -170,8 +170,7 @@ class _Run:
                 [label for label, share in its.items() if share > -np.inf] for its in shares_of(steps, self.options)
             ]
         else:
-            path = best_path(steps, forward(steps, summed=False))
-            found = [[label] for label in path.labels] if path else []
+            found = [[label] for label in best_path(steps, forward(steps, summed=False)).labels]
         for word, labels in zip(observed.words, found, strict=True):
             table = self.counts.setdefault(self.map.words.known(word), {})
             for label in labels:
