@@ -1,10 +1,11 @@
 """`ngram -gen`: sentences drawn from a model, SRILM's for the same -seed (section 11.7 of our SRILM specification)."""
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 import numpy as np
 
-from placerec.arrays import Ints
+from placerec.arrays import Floats, Ints
 from placerec.lm.logs import p_of, shown
 from placerec.lm.score import TokenSequence
 from placerec.srilm.model.scorers import Scorer, event_mask
@@ -14,6 +15,8 @@ from placerec.srilm.text.vocabulary import WordList
 
 # Words of a sentence, if its end is not drawn before.
 LONGEST = 50000
+# Of the distributions that were used last, so many probabilities are kept.
+_NUMBERS = 1 << 21
 
 
 def drand48(seed: int) -> Iterator[float]:
@@ -40,6 +43,7 @@ class Generator:
         names = [*words.index]
         self.enumerated: Ints = np.array([words.index[names[i]] for i in name_order(names).tolist()], np.int64)
         self.events = event_mask(words)[self.enumerated]
+        self._kept = lru_cache(max(1, _NUMBERS // len(names)))(self._distribution)
 
     def sentence(self, prefix: Sequence[int], *, longest: int = LONGEST) -> list[int]:
         """The words, by number, drawn behind a prefix until </s> is (left out), or none can be."""
@@ -51,13 +55,17 @@ class Generator:
             drawn.append(word)
         return drawn
 
-    def word(self, history: Sequence[int]) -> int:
-        """A word drawn after a history; -1 where every word has probability 0."""
-        ids = np.array([*history[max(0, len(history) - self.order + 1) :], self.enumerated[0]], np.int64)
+    def _distribution(self, history: tuple[int, ...]) -> tuple[Floats, Floats]:
+        """p of names (N,) in the order of SRILM's vocabulary, and sums (N,) of those of words that are predicted."""
+        ids = np.array([*history, self.enumerated[0]], np.int64)
         place = np.arange(len(ids))
         view = self.scorer(TokenSequence(ids, place == 0, place == len(ids) - 1))
         p = p_of(view.distribution(len(ids) - 1)[self.enumerated])
-        cumulative = np.cumsum(np.where(self.events, p, 0))
+        return p, np.cumsum(np.where(self.events, p, 0))
+
+    def word(self, history: Sequence[int]) -> int:
+        """A word drawn after a history; -1 where every word has probability 0."""
+        p, cumulative = self._kept(tuple(history[max(0, len(history) - self.order + 1) :]))
         if not cumulative[-1] > 0:
             return -1
         chosen = int(np.searchsorted(cumulative, next(self.numbers), side="right"))
