@@ -411,3 +411,4 @@ def test_what_srilm_does_not_survive_ends_in_a_line(run: Run, command: str, word
     status, out, err = run(f"ngram -lm m.lm {command}", p="a\n")
     assert (status > 0, out) == (True, "")
     assert words in err.splitlines()[-1]
+    assert run("ngram -lm m.lm -noise <s> -write-lm y")[0] == 0

@@ -217,7 +217,7 @@ class _Run:
         if options["noise-vocab"]:
             for line in self.streams.lines(options["noise-vocab"]):
                 noise |= {self.words.add(word) for word in tokens(line)[:1]}
-        if self.words.start in noise:
+        if options["ppl"] and self.words.start in noise:
             raise SrilmError(f"{SENTENCE_START} cannot be left out of sentences; name other words as noise")
         return handling_of(
             options.values,
