@@ -74,6 +74,24 @@ def test_options_of_recordings(world: Path, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("kind", ["images", "bags", "videos"])
+def test_one_recording_is_cut_into_training_and_test(world: Path, tmp_path: Path, kind: str) -> None:
+    (source,) = [path for path in (world / kind).glob("seq1*") if path.suffix != ".labels"]
+    # Images of this layout have times of their own, which --rate leaves alone.
+    whole = tokens(world, tmp_path / "w", source, "--rate", 10)["seq1"]
+    half = float(whole.times[6] - whole.times[0])
+    early = tokens(world, tmp_path / "e", source, "--rate", 10, "--to", half)["seq1"]
+    late = tokens(world, tmp_path / "l", source, "--rate", 10, "--from", half)["seq1"]
+    for stream, part in ((early, slice(0, 6)), (late, slice(6, None))):
+        assert stream.words == whole.words[part]
+        assert stream.frames == whole.frames[part]
+        assert stream.places == whole.places[part]
+        assert np.array_equal(stream.times, whole.times[part])
+    words = ("-w", world / "words.npz", "-o", tmp_path / "n")
+    misused("from 2 to 1 seconds is no part of a run", "tokenize", source, *words, "--from", 2, "--to", 1)
+    fails("has no frame from second 900; choose another part", "tokenize", source, *words, "--from", 900)
+
+
 def test_a_list_on_standard_input(world: Path, tmp_path: Path) -> None:
     files = sorted((world / "images/seq1/std_cam").iterdir())
     given = "".join(f"{file}\t{i}\t{'hall' if i < 6 else 'kitchen'}\n" for i, file in enumerate(files))
@@ -161,5 +179,5 @@ def test_every_command_that_takes_a_source_says_what_it_can_be() -> None:
         text = " ".join(done(command, "--help").stdout.split())
         assert "video" in text, command
         assert "bags" in text or "bag of ROS" in text, command
-        for option in ("--every", "--topic", "--labels"):
+        for option in ("--every", "--topic", "--labels", "--label-clock", "--camera", "--from", "--to", "--rate"):
             assert option in text
