@@ -237,6 +237,24 @@ def test_written_models_carry_their_classes_and_are_read_with_them(tmp_path: Pat
     assert call("ngram", *again, "-ppl", "-", stdin=text) == call("ngram", *files, "-ppl", "-", stdin=text)
 
 
+def test_a_rescored_model_is_written_without_the_classes_that_scored_it(tmp_path: Path) -> None:
+    files = model_files(tmp_path, "B 1 c\nA 0.25 a d\n")
+    (tmp_path / "other.lm").write_text(LM)
+    written = tmp_path / "w.lm"
+    assert call("ngram", *files, "-rescore-ngram", str(tmp_path / "other.lm"), "-write-lm", str(written))[0] == 0
+    assert written.read_text().endswith("\\end\\\n")
+
+
+def test_expansions_may_be_longer_than_the_model_with_the_classes(tmp_path: Path) -> None:
+    (tmp_path / "m.lm").write_text("\\data\\\nngram 1=3\n\n\\1-grams:\n-0.3\t</s>\n-99\t<s>\n-0.3\tA\n\n\\end\\\n")
+    (tmp_path / "m.cls").write_text("A 0.5 a b\nA 0.5 a b c\n")
+    files = ["-lm", str(tmp_path / "m.lm"), "-order", "1", "-classes", str(tmp_path / "m.cls")]
+    status, out, error = call("ngram", *files, "-expand-classes", "0", "-debug", "4", "-write-lm", "-")
+    assert status == 0
+    assert "ngram 3=1\n" in out
+    assert "writing 1 3-grams" in error
+
+
 def test_sums_over_all_words_are_one(tmp_path: Path) -> None:
     text = tmp_path / "t"
     text.write_text("a b c\nb a c a\nc c b\n" * 9)
