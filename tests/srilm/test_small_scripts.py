@@ -87,6 +87,13 @@ def test_unigrams_are_listed_with_their_probabilities() -> None:
     assert call(get_unigram_probs, "linear=1", stdin=LM)[1] == "b 0.316228\n<s> 0\na 0.562341\n"
 
 
+@pytest.mark.parametrize("number", ["x", "nan", "999", "1e999"])
+def test_what_is_no_log_probability_is_named(number: str) -> None:
+    status, out, error = call(get_unigram_probs, "linear=1", stdin=LM.replace("-0.25", number))
+    assert (status, out) == (1, "")
+    assert error == f"get-unigram-probs: '{number}' of 'a' is no log probability\n"
+
+
 @pytest.mark.parametrize("tool", [sort_lm, make_sub_lm, get_unigram_probs])
 def test_what_is_no_model_is_refused_and_nothing_written(tool: Tool) -> None:
     for text, complaint in ((LM.replace("\\end\\", ""), "no \\end\\"), (LM.replace("a b", "a"), "is no 2-gram")):
@@ -133,7 +140,6 @@ def test_parameters_made_in_steps_are_those_that_ngram_count_writes(
 
 
 def test_the_absolute_discount_is_that_of_ney() -> None:
-    Path("few")
     assert call(make_abs_discount, "-", stdin="1 30\n2 10\n3 7\n") == (0, "0.6\n", "")
     status, out, error = call(make_abs_discount, "-", stdin="2 10\n")
     assert (status, out) == (1, "")

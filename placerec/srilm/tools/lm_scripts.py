@@ -9,6 +9,8 @@ from placerec.srilm.text.numbers import leading_float, leading_int
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.tools.assignments import records, split_assignments
 
+# Beyond it p does not fit into a float64.
+_MOST_LOG10 = 308.0
 _HEADER = re.compile(r"ngram\s*(\d{1,9})\s*=", re.ASCII)
 _SECTION = re.compile(r"\\(\d{1,9})-grams:", re.ASCII)
 
@@ -98,8 +100,8 @@ def get_unigram_probs(arguments: Sequence[str], streams: Streams, tool: str = "g
         if line.order == 1 and line.ngram:
             text = tokens(line.text)[0]
             value = leading_float(text)
-            if value is None:
-                raise SrilmError(f"{tool}: {text!r} is no log probability")
+            if value is None or not value <= _MOST_LOG10:
+                raise SrilmError(f"{tool}: {text!r} of {line.ngram[0]!r} is no log probability")
             p = 0.0 if value <= ABOUT_LOG_ZERO else 10**value
             shown.append(f"{line.ngram[0]} {p:g}\n" if linear else f"{line.ngram[0]} {text}\n")
     streams.print("".join(shown))
