@@ -61,7 +61,7 @@ def _decision(path: Path | str, number: int, line: str) -> Decision:
 
 def format_decision(decision: Decision) -> str:
     """A decision as text for people, without a line end at its end."""
-    lines = [_title(decision), *_sentences(decision), "", *_columns(_PLACES, [*_place_rows(decision)])]
+    lines = [_title(decision), *_sentences(decision), "", *_columns(*_place_table(decision))]
     rows = [*_word_rows(decision)]
     if rows:
         lines += ["", _words_caption(decision), *_columns(_WORDS, rows)]
@@ -74,7 +74,7 @@ def decision_page(decision: Decision, sequence: str) -> str:
     body = [
         *map(paragraph, (_title(decision), *_sentences(decision))),
         heading("What the places' models say"),
-        table(_PLACES, _place_rows(decision), "The n-gram that answered, and the factor paid for each word left out."),
+        table(*_place_table(decision), _caption(decision)),
     ]
     if rows:
         against = f"Odds of {decision['best']} against {decision['rival']}"
@@ -89,14 +89,16 @@ def _title(decision: Decision) -> str:
 
 def _sentences(decision: Decision) -> list[str]:
     places, best, former = decision["places"], decision["best"], decision["best_before"]
-    after = f" after {' '.join(decision['history'])}" if decision["history"] else ", the first word"
+    if several := decision.get("dictionaries"):
+        words = ", ".join(said["word"] for said in several.values() if said["word"])
+        seen = f"The words {words} were seen, and each counts to the power of {decision['alpha']:g}. "
+    else:
+        after = f" after {' '.join(decision['history'])}" if decision["history"] else ", the first word"
+        seen = f"The word {decision['word']} was seen{after}. "
     moved = f"from {_number(places[best]['before'])} to {_number(places[best]['after'])}"
     changed = f"; before it, {former} was" if former != best else ", as before"
     label = f" The frame is labelled {decision['place']}." if decision["place"] else ""
-    sentences = [
-        f"The word {decision['word']} was seen{after}. "
-        f"The belief in {best} went {moved}, and it is the most probable place{changed}.{label}"
-    ]
+    sentences = [f"{seen}The belief in {best} went {moved}, and it is the most probable place{changed}.{label}"]
     if "unknown" in decision:
         news = decision["unknown"]
         odds = _factor(news["log10_ratio"])
@@ -107,10 +109,39 @@ def _sentences(decision: Decision) -> list[str]:
     return sentences
 
 
+def _place_table(decision: Decision) -> tuple[Sequence[str], list[list[str]]]:
+    """Header and rows of what the places' models say."""
+    several = decision.get("dictionaries")
+    if several is None:
+        return _PLACES, [*_place_rows(decision)]
+    named = {said["word"]: said["places"] for said in several.values() if said["word"]}
+    rows = [
+        [
+            place,
+            *(_factor(own[place]["log10_p"]) for own in named.values()),
+            _factor(said["log10_p"]),
+            _number(said["before"]),
+            _number(said["after"]),
+        ]
+        for place, said in _by_belief(decision)
+    ]
+    return ("place", *(f"p of {word}" for word in named), "together, weighed", "belief before", "after"), rows
+
+
+def _caption(decision: Decision) -> str:
+    if "dictionaries" in decision:
+        return "The words' probabilities, and the product of them all to the power of alpha."
+    return "The n-gram that answered, and the factor paid for each word left out."
+
+
+def _by_belief(decision: Decision) -> list[tuple[str, Any]]:
+    """The places and what is said of them, the most probable first."""
+    return sorted(decision["places"].items(), key=lambda item: -(item[1]["after"] or 0))
+
+
 def _place_rows(decision: Decision) -> Iterator[list[str]]:
-    """The places by belief, the most probable first."""
     words = [*decision["history"], decision["word"]]
-    for place, said in sorted(decision["places"].items(), key=lambda item: -(item[1]["after"] or 0)):
+    for place, said in _by_belief(decision):
         paid = " x ".join(_factor(weight) for weight in said["backoffs"]) or "-"
         answer = " ".join(words[len(words) - said["order"] :])
         before, after = _number(said["before"]), _number(said["after"])

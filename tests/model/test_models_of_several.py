@@ -12,6 +12,7 @@ from helpers.several_dictionaries import FURTHER, several_words, write_several
 from placerec.errors import LanguageModelError, ModelError, StreamError
 from placerec.evaluation.metrics import evaluate
 from placerec.hohmm.weights import ALPHAS, MEMORIES
+from placerec.inspection.decision import format_decision, inspect_decision
 from placerec.methods import decode, decode_lines, load_decoder
 from placerec.model import Decoding, calibrate, load_model, load_recognizer, train_lm, update
 from placerec.model.evidence import group_borders
@@ -140,6 +141,20 @@ def test_kenlm_scores_the_words_of_every_dictionary(model: Path, runs: list[Path
     pytest.importorskip("kenlm")
     native, kenlm = (decode([runs[3]], model, scorer=scorer)[0].belief for scorer in ("native", "kenlm"))
     assert kenlm == pytest.approx(native, abs=1e-5)
+
+
+def test_a_decision_can_be_read(tmp_path: Path, model: Path, runs: list[Path]) -> None:
+    [beliefs] = decode([runs[3]], model, out=tmp_path / "beliefs", options=Decoding(explain=True))
+    frame = beliefs.stream.frames[7]
+    text = format_decision(
+        inspect_decision(tmp_path / "beliefs/run4.explain.jsonl", frame, out=tmp_path / "decision.html")
+    )
+    stream = several_words("run4", 4)
+    words = [stream.in_dictionary(name).words[7] for name in stream.dictionaries]
+    assert f"The words {', '.join(words)} were seen, and each counts to the power of " in text
+    header = next(line for line in text.splitlines() if line.startswith("place "))
+    assert all(f"p of {word}" in header for word in words)
+    assert "to the power of alpha" in (tmp_path / "decision.html").read_text()
 
 
 def test_lines_have_a_word_of_each_dictionary_in_any_order(model: Path, runs: list[Path]) -> None:
