@@ -113,8 +113,8 @@ class ClassModel:
         self.prepare([((), word)])
         return States({(self.steps[(), word].context, ()): 0.0}, 0.0)
 
-    def advance(self, states: "States", word: int) -> tuple["States", list[str]]:
-        """Where a sentence stands after one more word, and what is printed before the word's probability."""
+    def advance(self, states: "States", word: int) -> tuple["States", float, list[str]]:
+        """Where a sentence stands after one more word, the sum of all ways there, and what is printed before it."""
         classes = self.definitions.starting.get(word, [])
         self.prepare(
             (context, token)
@@ -122,30 +122,31 @@ class ClassModel:
             if not rest
             for token in (word, *(number for number, _, _ in classes))
         )
+        # What is looked back at is rounded in another order than what is looked at first: found from printed values.
         after: dict[tuple[Ngram, Ngram], float] = {}
+        ahead: dict[tuple[Ngram, Ngram], float] = {}
         tags = []
         for (context, rest), log10_p in states.of.items():
             if rest:
                 if rest[0] == word:
                     _add(after, (context, rest[1:]), log10_p)
+                    _add(ahead, (context, rest[1:]), log10_p)
                 continue
             for token, share, left in ((word, 0.0, ()), *classes):
                 step = self.steps[context, token]
                 tags.append(step.tag)
-                _add(after, (step.context, left), single(single(log10_p + step.log10_p) + share))
-        total = -math.inf
-        for log10_p in after.values():
-            total = add_logs(total, log10_p)
-        return States(after, total), tags
+                _add(after, (step.context, left), single(log10_p + single(step.log10_p + share)))
+                _add(ahead, (step.context, left), single(single(log10_p + step.log10_p) + share))
+        return States(after, _total(after)), _total(ahead), tags
 
     def score(self, states: "States", word: int) -> tuple["States", float, str]:
         """Where a sentence stands after one more word, the word's log10 p, and what is printed before it."""
-        after, tags = self.advance(states, word)
+        after, total, tags = self.advance(states, word)
         if after.total == -math.inf:
             # Nothing explains the words so far: what comes is taken as if they had been explained up to here.
             context = next((context for context, rest in after.of if not rest), ())
             return States({(context, ()): states.total}, states.total), -math.inf, "".join(tags)
-        return after, single(after.total - states.total), "".join(tags)
+        return after, single(total - states.total), "".join(tags)
 
     def spread(self, context: Ngram) -> Floats:
         """p of every token behind a context, float64 by SRILM's number."""
@@ -175,6 +176,13 @@ def add_logs(a: float, b: float) -> float:
     if low == -math.inf:
         return high
     return single(high + math.log10(1 + math.exp((low - high) * LN10)))
+
+
+def _total(states: Mapping[tuple[Ngram, Ngram], float]) -> float:
+    total = -math.inf
+    for log10_p in states.values():
+        total = add_logs(total, log10_p)
+    return total
 
 
 def _add(states: dict[tuple[Ngram, Ngram], float], state: tuple[Ngram, Ngram], log10_p: float) -> None:
