@@ -54,7 +54,7 @@ def call(tool: str, *arguments: str, stdin: bytes = b"") -> tuple[int, str, str]
 
 
 def is_of_classes(case: Case) -> bool:
-    return case["id"].startswith(("cls-", "ngc-", "rep-", "uni-"))
+    return str(case["id"]).startswith(("cls-", "ngc-", "rep-", "uni-"))
 
 
 @pytest.mark.parametrize(
