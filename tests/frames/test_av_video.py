@@ -19,6 +19,7 @@ from helpers.recordings import (
     grays,
     pictures,
     read_images,
+    scheduled_as_before,
     write_bag,
     write_video,
 )
@@ -31,6 +32,7 @@ from placerec.frames.video import Video
 av = pytest.importorskip("av")
 
 
+@scheduled_as_before()
 def encoded(path: Path, codec: str, times: list[int] | None = None) -> Path:
     """A video of 20 pictures, at these tenths of a second."""
     with av.open(str(path), "w") as container:
@@ -44,6 +46,7 @@ def encoded(path: Path, codec: str, times: list[int] | None = None) -> Path:
     return path
 
 
+@scheduled_as_before()
 def pieces(codec: str, **options: str) -> list[bytes]:
     """20 pictures as a camera sends them: what is needed to decode one is in it or before it."""
     context = av.CodecContext.create(codec, "w")

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from helpers.recordings import cut, decoded, find_one, pictures, read_images, write_video
+from helpers.recordings import cut, decoded, find_one, pictures, read_images, scheduled_as_before, write_video
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
@@ -305,6 +305,7 @@ def test_what_may_be_something_else_is_known_by_content(tmp_path: Path) -> None:
             find_sequences([tmp_path / "runs" / name])
 
 
+@scheduled_as_before()
 def encoded(path: Path, codec: str, pixels: str = "yuv420p", **options: str) -> Path:
     """A video of 20 pictures, ten a second, by a codec that OpenCV does not write."""
     av = pytest.importorskip("av")

@@ -1,6 +1,8 @@
 """Real recordings for tests: videos written by OpenCV, bags written by rosbags."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,19 @@ def pictures(count: int = 20, height: int = 48, width: int = 64) -> list[Picture
     wall = cv2.GaussianBlur(rng.integers(0, 256, (height, width + 4 * count, 3), dtype=np.uint8), (0, 0), 4)
     wall = cv2.normalize(wall, np.empty_like(wall), 0, 255, cv2.NORM_MINMAX)
     return [np.ascontiguousarray(wall[:, 4 * i : 4 * i + width]) for i in range(count)]
+
+
+@contextmanager
+def scheduled_as_before() -> Iterator[None]:
+    """The AV1 encoder makes its caller a real-time thread, where it may: all that comes after would starve others."""
+    if not hasattr(os, "sched_getscheduler"):
+        yield
+        return
+    policy, priority = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, policy, priority)
 
 
 def grays(found: Sequence[Picture]) -> list[NDArray[Any]]:
