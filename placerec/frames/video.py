@@ -101,7 +101,11 @@ def list_times(path: Path) -> "array[float]":
     _check_readable(path)
     with _opened(path, packets=True) as capture:
         # What comes before the start is there for the decoder's sake: it is cut off by the container.
-        times = array("d", sorted(time for time in _walked(path, capture) if time > -SAME))
+        walked = array("d", _walked(path, capture))
+        times = array("d", sorted(time for time in walked if time > -SAME))
+    if path.suffix.lower() in RAW_SUFFIXES and not times:
+        # Such a stream has no times, and older OpenCV (4.10) makes up some that are far below 0.
+        times = array("d", (number / RAW_RATE for number in range(len(walked))))
     if any(after - before < SAME for before, after in pairwise(times)):
         # MPEG program streams: not every packet has its time.
         with _opened(path) as capture:
