@@ -7,7 +7,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent import futures
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -22,6 +21,7 @@ from placerec.errors import PlacerecError
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 R = TypeVar("R")
+_Pool = TypeVar("_Pool", ThreadPoolExecutor, ProcessPoolExecutor)
 Progress = Callable[[int, int], None]  # items done, items in all
 # Shows what is being done under a label, as long as it takes.
 ProgressBar = Callable[[str], AbstractContextManager[Progress]]
@@ -116,10 +116,8 @@ def map_jobs(
 
 def _threads(function: Callable[[T], R], items: Iterable[T], /) -> Iterator[R]:
     count = processors()
-    with ThreadPoolExecutor(count) as pool:
-        yield from look_ahead(
-            lambda item: pool.submit(function, item), Future.result, items, 2 * count, at_end=partial(_shut, pool)
-        )
+    with _shut_in_time(ThreadPoolExecutor(count)) as pool:
+        yield from look_ahead(lambda item: pool.submit(function, item), Future.result, items, 2 * count)
 
 
 def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few: int = FEW) -> Iterator[R]:
@@ -131,7 +129,8 @@ def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few
     call = partial(_call, log.getEffectiveLevel())
     # Processes that begin empty, so that no thread or lock of this one is copied half-way.
     spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_begin, initargs=(function,)) as pool:
+    made = ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_begin, initargs=(function,))
+    with _shut_in_time(made) as pool:
 
         def submit(item: T) -> "Future[LoggedResult[R]]":
             # A process that this starts meets Ctrl-C only once `_begin` has told it how to end.
@@ -140,14 +139,23 @@ def _processes(jobs: int, function: Callable[[T], R], items: Iterable[T], /, few
 
         try:
             items = chain(first, rest)
-            for answer in look_ahead(submit, Future.result, items, 4 * jobs, at_end=partial(_shut, pool)):
+            for answer in look_ahead(submit, Future.result, items, 4 * jobs):
                 yield answer.replay()
         except BrokenProcessPool as error:
             raise JobError("a process of the work was killed; give it more memory, or fewer jobs") from error
 
 
-def _shut(pool: futures.Executor, _: Iterable[object]) -> None:
-    pool.shutdown(cancel_futures=True)
+@contextmanager
+def _shut_in_time(pool: _Pool) -> Iterator[_Pool]:
+    """Of the work that nobody waits for any longer nothing is begun; what has begun is waited for.
+
+    Not where the garbage collector ends a generator in another thread: that may be one that the pool waits for.
+    """
+    maker = threading.get_ident()
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=threading.get_ident() == maker, cancel_futures=True)
 
 
 @contextmanager

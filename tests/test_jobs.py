@@ -5,6 +5,7 @@ import logging
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Generator, Iterator
 from functools import partial
@@ -162,3 +163,33 @@ def test_an_exception_of_the_items_comes_through(jobs: int | None) -> None:
 @pytest.mark.parametrize("count", [0, 1, FEW - 1, 40])
 def test_any_number_of_items(jobs: int | None, count: int) -> None:
     assert list(workers(jobs)(double, range(count))) == [2 * number for number in range(count)]
+
+
+class Ending:
+    """An item whose way to another process ends the work: as the garbage collector does, in a thread of the pool."""
+
+    def __init__(self) -> None:
+        self.begun, self.ended = threading.Event(), threading.Event()
+        self.results: Generator[int, None, None] | None = None
+
+    def __reduce__(self) -> tuple[type[int], tuple[int]]:
+        assert self.begun.wait(60)
+        assert self.results is not None
+        self.results.close()
+        self.ended.set()
+        return int, (7,)
+
+
+def echo(item: object) -> int:
+    return 1
+
+
+def test_work_that_a_thread_of_the_pool_gives_up_ends() -> None:
+    """A thread that waits for itself would keep the program for good."""
+    item = Ending()
+    made = workers(2)(echo, [0] * FEW + [item])
+    assert isinstance(made, Generator)
+    item.results = made
+    assert next(made) == 1
+    item.begun.set()
+    assert item.ended.wait(60), "the thread waits for itself"
