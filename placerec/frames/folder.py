@@ -134,6 +134,19 @@ def list_folder(folder: Path) -> Listing:
     return Listing(tuple(images), tuple(recordings), ordered, tuple(sorted(labels)), ", and ".join(said))
 
 
+def holds_images(path: Path, depth: int) -> bool:
+    """Whether a path is an image or a recording by name, or a folder with one in it or at most `depth` folders deeper.
+
+    Raises SourceError for a folder that cannot be read.
+    """
+    if not path.is_dir():
+        return path.name.lower().endswith(SUFFIXES) or _is_recording(path)
+    listing = list_folder(path)
+    if listing.images or listing.recordings:
+        return True
+    return depth > 0 and any(holds_images(path / name, depth - 1) for name in listing.folders)
+
+
 def _is_recording(path: Path) -> bool:
     return path.suffix.lower() in bag.SUFFIXES or video.is_video(path)
 

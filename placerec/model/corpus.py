@@ -6,7 +6,9 @@ from itertools import islice
 from pathlib import Path
 
 from placerec.errors import StreamError
+from placerec.frames.folder import holds_images
 from placerec.frames.places import check_place, check_twins
+from placerec.model.folder import MODEL_JSON, TOKENS
 from placerec.model.record import LearnedSequence, Record, Recorder
 from placerec.words import Selection, Sentences, each_sentence, read_vocabulary, sentences_per_place
 from placerec.words.folder import (
@@ -15,6 +17,7 @@ from placerec.words.folder import (
     each_stream,
     find_vocabulary,
     is_stream,
+    no_streams,
     stream_files,
 )
 from placerec.words.stream import FIRST, column_of, locate
@@ -126,9 +129,14 @@ def vocabularies_of(
 def _gather_sentences(
     folder: Path, keep: Keep, vocabulary: Path | str | None, remedy: str
 ) -> tuple[Sequence[str], Record]:
+    if (folder / MODEL_JSON).exists():
+        made = folder / TOKENS
+        remedy = f"name {made}/" if made.is_dir() else "name the tokens/ that `placerec tokenize` makes of images"
+        raise StreamError(f"{folder}: is a model of train-lm, and no token streams; {remedy}")
     files = sorted((p for p in folder.iterdir() if p.suffix == ".txt" and p.name != VOCABULARY), key=lambda p: p.stem)
-    if not files:
-        raise StreamError(f"{folder}: holds neither token streams (.tsv) nor sentences (PLACE.txt)")
+    # Many who record images lay a times.txt beside them.
+    if not files or (vocabulary is None and not (folder / VOCABULARY).exists() and holds_images(folder, 1)):
+        raise no_streams(folder, "holds neither token streams (.tsv) nor sentences (PLACE.txt)")
     words = read_vocabulary(vocabulary or find_vocabulary([folder, folder.resolve().parent]))
     check_twins((path.stem, str(path)) for path in files)
     listed = frozenset(words)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 from placerec.errors import StreamError, at, refuse_string
 from placerec.files import all_lines, encoded, read_text, whole_folder, write_text
+from placerec.frames.find import MAX_DEPTH
+from placerec.frames.folder import holds_images
 from placerec.frames.naming import unique_names
 from placerec.version import __version__
 from placerec.words.stream import (
@@ -66,11 +68,25 @@ def stream_files(sources: Iterable[Path | str]) -> list[Path]:
             raise StreamError(f"{source}: no such file or folder; token streams (.tsv) are expected")
         found = sorted(p for p in source.iterdir() if is_stream(p)) if source.is_dir() else [source]
         if not found:
-            raise StreamError(f"{source}: holds no token stream (.tsv); `placerec tokenize` makes them of images")
+            raise no_streams(source, "holds no token stream (.tsv)")
+        if not is_stream(found[0]) and holds_images(source, 0):
+            raise no_streams(source, "is no token stream (.tsv)")
         for path in found:
             if files.setdefault(os.path.abspath(path), path) is not path:
                 raise StreamError(f"{path}: is given twice; name each sequence once")
     return list(files.values())
+
+
+def no_streams(source: Path, missing: str) -> StreamError:
+    """The error that a file or folder is not what is expected, in the words of `missing`, and what makes it of images.
+
+    `source` is looked through for images, so that the command can be told.
+    """
+    if not holds_images(source, MAX_DEPTH):
+        return StreamError(f"{source}: {missing}; `placerec tokenize` makes token streams of images")
+    what = "images" if source.is_dir() else "an image or a recording"
+    command = f"placerec tokenize {source} -w words.npz -o tokens/"
+    return StreamError(f"{source}: {missing}, but {what}; `{command}` makes token streams of that")
 
 
 def read_streams(sources: Iterable[Path | str]) -> list[WordStream]:

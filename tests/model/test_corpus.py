@@ -96,10 +96,31 @@ def test_missing_things_are_named(tmp_path: Path) -> None:
     refused("nothing: no such file or folder; token streams (.tsv) are expected", tmp_path / "nothing")
     refused("empty: holds neither token streams (.tsv) nor sentences (PLACE.txt)", tmp_path / "empty")
     refused("empty: holds no token stream (.tsv); `placerec tokenize` makes", tmp_path / "empty", folder)
+    folder_of = "but images; `placerec tokenize {} -w words.npz -o tokens/` makes token streams of that"
+    for name in ("runs/run1/std_cam/1.jpeg", "kitti/image_0/000000.png", "phone/clip.mp4"):
+        write(tmp_path / name, "")
+        top = tmp_path / name.partition("/")[0]
+        write(top / "times.txt", "0.5\n") if "kitti" in name else None
+        said = folder_of.format(top)
+        refused(f"{top}: holds neither token streams (.tsv) nor sentences (PLACE.txt), {said}", top)
+        refused(f"{top}: holds no token stream (.tsv), {said}", top, folder)
+        refused(f"{tmp_path / name}: is no token stream (.tsv), but an image or a recording", tmp_path / name)
     refused("other.txt: no such file", run, vocabulary=tmp_path / "other.txt")
     refused("holds no word; one word a line is expected", run, vocabulary=write(tmp_path / "v.txt", "\n"))
     (folder / "vocab.txt").unlink()
     refused("tokens/vocab.txt: no such file; the vocabulary (all words, one a line) is named with --vocab FILE", run)
+
+
+def test_a_model_is_told_from_sentences(tmp_path: Path) -> None:
+    folder = write_tokens(tmp_path / "tokens")
+    model = tmp_path / "model"
+    train_lm([folder], model)
+    no_tokens = "model: is a model of train-lm, and no token streams; name "
+    refused(f"{no_tokens}the tokens/ that `placerec tokenize` makes of images", model)
+    write_tokens(model / "tokens")
+    refused(f"{no_tokens}{model}/tokens/", model)
+    # Those of the model are read as any.
+    assert list(read_corpus([model / "sentences"], selection=Selection()).sentences) == list(PLACES)
 
 
 @pytest.mark.parametrize(
