@@ -185,7 +185,7 @@ def calibrate(model: Path, tokens: tuple[Path, ...], options: "Decoding") -> Non
 
 
 @click.command(epilog=INSPECT_EXAMPLES)
-@click.argument("path", metavar="MODEL.arpa|NAME.explain.jsonl", type=shared.PATH)
+@click.argument("path", metavar="MODEL.arpa|MODEL/|NAME.explain.jsonl", type=shared.PATH)
 @click.argument("asked", metavar="[NGRAM...|FRAME]", nargs=-1)
 @click.option("--top", type=click.IntRange(min=0), default=5, help="How many n-grams of each order to show.")
 @shared.json_option()
@@ -195,19 +195,24 @@ def inspect(path: Path, asked: tuple[str, ...], top: int, as_json: bool, out: Pa
     """Read a model, or one decision of `decode --explain`.
 
     Of a model: counts, top n-grams, sums, p(w | h). NGRAM is some words in quotes: the probability of the last one
-    after the others is shown step by step, and which words are most probable after all of them. Of the decision at
-    FRAME (its name, or the beginning of it): what each place's model said of the word, what that made of the belief,
-    and which of the last words speak for the best place and against it.
+    after the others is shown step by step, and which words are most probable after all of them. Of a folder, MODEL/ of
+    train-lm or any, all ARPA files are shown, with the NGRAMs whose words they list. Of the decision at FRAME (its
+    name, or the beginning of it): what each place's model said of the word, what that made of the belief, and which of
+    the last words speak for the best place and against it.
     """
     if path.name.endswith(".jsonl"):
         found, text = _decision(path, asked, out)
     else:
         if out is not None:
             raise click.UsageError("-o is for the page of a decision (NAME.explain.jsonl FRAME); leave it out")
-        from placerec.lm.inspect import format_inspection, inspect_model
+        from placerec.lm.inspect import format_inspection, inspect_model, inspect_models
 
-        found = inspect_model(path, asked, top=top)
-        text = format_inspection(found)
+        if path.is_dir():
+            found = inspect_models(path, asked, top=top)
+            text = "\n\n".join(map(format_inspection, found))
+        else:
+            found = inspect_model(path, asked, top=top)
+            text = format_inspection(found)
     shared.echo_json(found) if as_json else click.echo(text)
 
 
@@ -222,20 +227,22 @@ def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[obj
     return decision, format_decision(decision)
 
 
-@click.command(epilog="Example: placerec check model/*.arpa")
-@click.argument("models", metavar="MODEL.arpa...", nargs=-1, required=True, type=shared.PATH)
+@click.command(epilog="Example: placerec check model/")
+@click.argument("models", metavar="MODEL.arpa|MODEL/...", nargs=-1, required=True, type=shared.PATH)
 @shared.json_option()
 @shared.talk_options
 def check(models: tuple[Path, ...], as_json: bool) -> None:
     """Check that a model sums to 1 and agrees with KenLM.
 
     The probabilities after every context must sum to 1, and KenLM must give every token the same one. A file that SRILM
-    reads and KenLM refuses is compared through a copy, and what KenLM refuses is said.
+    reads and KenLM refuses is compared through a copy, and what KenLM refuses is said. Of a folder, MODEL/ of train-lm
+    or any, all ARPA files are checked.
     """
+    from placerec.lm.arpa import arpa_files
     from placerec.lm.check import check_model
 
     checks = []
-    for path in models:
+    for path in [file for named in models for file in arpa_files(named)]:
         checks.append(check_model(path))
         if not as_json:
             click.echo(checks[-1].sentence())

@@ -144,6 +144,20 @@ def with_unigrams(model: BackoffModel, words: Sequence[str]) -> BackoffModel:
     )
 
 
+def arpa_files(path: Path | str) -> list[Path]:
+    """The ARPA files that a path names: itself; of a folder those in it, and then those in the folders in it.
+
+    So a MODEL/ gives the models of all dictionaries. Raises LanguageModelError for a folder without any.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        return [path]
+    found = [file for pattern in ("*.arpa", "*/*.arpa") for file in sorted(path.glob(pattern))]
+    if not found:
+        raise LanguageModelError(f"{path}: holds no ARPA file (*.arpa); name one, or the folder of train-lm")
+    return found
+
+
 def read_arpa(path: Path | str, *, tolerant: bool = True) -> BackoffModel:
     """Read an ARPA file (gzipped if the name ends in .gz).
 

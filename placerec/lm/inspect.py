@@ -9,7 +9,7 @@ import numpy as np
 
 from placerec.errors import LanguageModelError, refuse_string
 from placerec.files import read_text
-from placerec.lm.arpa import read_with_complaint
+from placerec.lm.arpa import arpa_files, read_with_complaint
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.check import context_sums, power_of_ten
 from placerec.lm.score import Contexts
@@ -25,7 +25,28 @@ def inspect_model(path: Path | str, ngrams: Sequence[str] = (), *, top: int = 5)
     without n-grams above all others do not count. Raises LanguageModelError for a file that is not ARPA or a word that
     it does not list.
     """
-    model, refused = read_with_complaint(path)
+    return _inspected(path, *read_with_complaint(path), ngrams, top)
+
+
+def inspect_models(folder: Path | str, ngrams: Sequence[str] = (), *, top: int = 5) -> list[dict[str, Any]]:
+    """What `inspect_model` tells of each ARPA file in a folder (`arpa_files`), such as MODEL/.
+
+    Each of `ngrams` is explained by the models that list its words, for each dictionary has words of its own. Raises
+    LanguageModelError as `inspect_model` does, and for an n-gram whose words no model lists.
+    """
+    found, left = [], dict.fromkeys(ngrams)
+    for path in arpa_files(folder):
+        model, refused = read_with_complaint(path)
+        own = [ngram for ngram in ngrams if all(word in model for word in ngram.split())]
+        found.append(_inspected(path, model, refused, own, top))
+        for ngram in own:
+            left.pop(ngram, None)
+    if left:
+        raise LanguageModelError(f"{folder}: no model there has all words of {next(iter(left))!r}")
+    return found
+
+
+def _inspected(path: Path | str, model: BackoffModel, refused: str, ngrams: Sequence[str], top: int) -> dict[str, Any]:
     orders = range(1, model.listed_order + 1)
     sums = np.concatenate([totals for _, _, totals in context_sums(model)])
     comment = read_text(Path(path), LanguageModelError).partition("\n")[0]

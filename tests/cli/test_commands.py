@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 import pytest
+from helpers.several_dictionaries import FURTHER, write_several
 from helpers.small_world import PLACES, run_through, write_tokens
 from helpers.typed_commands import SMALL, done, fails, make_words, misused, placerec
 
@@ -249,7 +250,8 @@ def test_check_and_inspect_name_what_they_cannot_read(world: Path, tmp_path: Pat
     for command in ("check", "inspect"):
         fails(r"none\.arpa: no such file", command, tmp_path / "none.arpa")
         fails(r"empty\.arpa:1: the file ends where", command, tmp_path / "empty.arpa")
-        fails("model: is a folder, and a file is expected", command, world / "model")
+        (tmp_path / "none").mkdir(exist_ok=True)
+        fails("none: holds no ARPA file", command, tmp_path / "none")
     fails("the word 'zz' is not in the model", "inspect", world / "model/hall.arpa", "w01 zz")
 
 
@@ -265,6 +267,31 @@ def test_check_is_content_with_our_models_and_not_with_others(world: Path, tmp_p
     assert result.exit_code == 1
     assert "FAIL (worst context" in result.stdout
     assert result.stderr == "placerec: a model is not as it should be; see above\n"
+
+
+def test_check_and_inspect_do_all_files_of_a_folder(tmp_path: Path) -> None:
+    pytest.importorskip("kenlm")
+    write_several(tmp_path / "tokens")
+    model = tmp_path / "model"
+    done("train-lm", tmp_path / "tokens", "-o", model, "-q")
+    folders = [model, *(model / name for name in FURTHER)]
+    files = [str(folder / f"{place}.arpa") for folder in folders for place in PLACES]
+    lines = done("check", model).stdout.splitlines()
+    assert [line.partition(":")[0] for line in lines] == files
+    assert [one["path"] for one in json.loads(done("check", model, "--json").stdout)] == files
+    text = done("inspect", model, "w01 w02", "pn10.w1", "--top", 1).stdout
+    assert [line for line in text.splitlines() if ": order " in line] == [f"{file}: order 2" for file in files]
+    shown = json.loads(done("inspect", model, "w01 w02", "pn10.w1", "--json").stdout)
+    assert [one["path"] for one in shown] == files
+    explained = [[entry["word"] for entry in one["explained"]] for one in shown]
+    assert explained == [["w02"]] * 3 + [[]] * 3 + [["pn10.w1"]] * 3
+    fails("model: no model there has all words of 'w01 pn10.w1'", "inspect", model, "w02", "w01 pn10.w1")
+    (model / "pn10/office.arpa").write_text("")
+    # What was checked before is told.
+    result = placerec("check", model)
+    assert result.exit_code == 1
+    assert len(result.stdout.splitlines()) == 8
+    assert result.stderr.startswith(f"placerec: {model}/pn10/office.arpa:1: ")
 
 
 def test_inspect_shows_ngrams(world: Path) -> None:
