@@ -199,3 +199,19 @@ def test_classes_of_single_words_are_seen_through(folder: Path) -> None:
     # The first word costs nothing, so only the second word's share of the class is there.
     assert [float(p) for p in other] == pytest.approx([float(p) + math.log10(0.75) for p in best], abs=1e-5)
     assert call(*arguments, "words.txt", "-classes", "c.classes")[0] == 2
+
+
+def test_models_over_classes_are_mixed_with_fixed_weights(folder: Path) -> None:
+    Path("c.classes").write_text("room 0.25 bed\nroom 0.75 bath\n")
+    Path("words.txt").write_text("bed bath hall hall\n")
+    arguments = ["hidden-ngram", "-lm", "m.lm", "-hidden-vocab", "e.txt", "-text", "words.txt", "-nbest", "2"]
+    arguments += ["-classes", "c.classes", "-simple-classes"]
+    _, alone, _ = call(*arguments)
+    # A model mixed with itself stays what it is.
+    status, mixed, err = call(*arguments, "-mix-lm", "m.lm", "-bayes", "0")
+    assert (status, err) == (0, "")
+    assert re.sub(r"-[\d.]+", "", mixed) == re.sub(r"-[\d.]+", "", alone)
+    scores, expected = (list(map(float, re.findall(r"NBEST_\d (-[\d.]+)", text))) for text in (mixed, alone))
+    assert scores == pytest.approx(expected, abs=1e-5)
+    status, _, err = call(*arguments, "-mix-lm", "m.lm")
+    assert (status, err) == (2, "with -classes only -bayes 0 mixes models while scoring\n")

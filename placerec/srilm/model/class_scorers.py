@@ -58,6 +58,11 @@ class SimpleClasses:
         self.ids = sequence.ids
         self.view = model(sequence._replace(ids=self.class_of[sequence.ids]))
 
+    @property
+    def used(self) -> Ints:
+        """How many words before each word the model can use, int64 (T,)."""
+        return self.view.used
+
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""
         ids = self.ids if words is None else words
@@ -102,7 +107,7 @@ class ClassModel:
         view = self.model(TokenSequence(np.array([i for row in rows for i in row], np.int64), first, ~first))
         scored = view.score()
         for key, stop in zip(wanted, stops.tolist(), strict=True):
-            used = int(view.contexts.lengths[stop - 1])
+            used = int(view.used[stop - 1])
             context = (*key[0], key[1])
             self.steps[key] = Step(
                 float(scored.log10_p[stop - 2]), scored.tag(stop - 2), context[len(context) - used :]

@@ -8,8 +8,13 @@ from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.logs import log10, p_of, shown
 from placerec.lm.mix import Cache, loglinear, mixed, posteriors, with_cache
 from placerec.lm.score import TokenSequence
-from placerec.srilm.model.scorers import Model, Scored, Scorer, event_numbers
+from placerec.srilm.model.scorers import Model, Scored, Scorer, Sighted, event_numbers
 from placerec.srilm.text.vocabulary import WordList
+
+
+def _longest(views: Sequence[Sighted]) -> Ints:
+    longest: Ints = np.max([view.used for view in views], axis=0)
+    return longest
 
 
 class Mixture:
@@ -34,6 +39,11 @@ class Mixture:
         else:
             plain = np.array(weights, np.float64)
             self.posteriors = np.repeat(plain[:, None] / plain.sum(), len(sequence.ids), axis=1)
+
+    @property
+    def used(self) -> Ints:
+        """How many words before each word any of the models can use, int64 (T,)."""
+        return _longest(self.views)
 
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""
@@ -73,7 +83,7 @@ class LogLinear:
         self.weights, self.sequence, self.debug, self.sums = weights, sequence, debug, sums
         self.views = [model(sequence) for model in models]
         self.events = event_numbers(words)
-        self.used = np.max([view.contexts.lengths for view in self.views], axis=0)
+        self.used = _longest(self.views)
 
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""

@@ -34,8 +34,17 @@ class View(Protocol):
         """log10 p float32 of every word, by SRILM's number, in the place of word `t`."""
 
 
+class Sighted(View, Protocol):
+    """A view of which it is known how far each word looks back."""
+
+    @property
+    def used(self) -> Ints:
+        """How many words before each word count for it, int64 (T,)."""
+
+
 # Something that gives words a probability: reads a token sequence.
 Scorer = Callable[[TokenSequence], View]
+SightedScorer = Callable[[TokenSequence], Sighted]
 
 
 def event_mask(words: WordList) -> Mask:
@@ -91,6 +100,11 @@ class ModelView:
         self.contexts = Contexts(self.tables, self.digits, np.flatnonzero(sequence.first))
         self.unknown = model.words.index[model.words.unknown]
         self.tags = ["[OOV]", *(f"[{n}gram]" for n in range(1, len(self.tables.tables) + 1))]
+
+    @property
+    def used(self) -> Ints:
+        """How many words before each word the model can use, int64 (T,)."""
+        return self.contexts.lengths
 
     @cached_property
     def near(self) -> Mask:

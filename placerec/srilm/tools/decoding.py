@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
 from placerec.lm.logs import LN10
-from placerec.srilm.model.scorers import Scorer
+from placerec.srilm.model.scorers import SightedScorer
 from placerec.srilm.model.trellis import (
     Step,
     backward,
@@ -48,7 +48,9 @@ OPTIONS: Options = {
 }
 
 
-def language_model(options: Parsed, words: WordList, streams: Streams, *, kept: Sequence[str] = ()) -> Scorer | None:
+def language_model(
+    options: Parsed, words: WordList, streams: Streams, *, kept: Sequence[str] = ()
+) -> SightedScorer | None:
     """The model that -lm and its sisters name; None without -lm. Mixtures are always mixed while scoring.
 
     `kept`: options that mean something else to the decoder than to `ngram`.
@@ -58,7 +60,8 @@ def language_model(options: Parsed, words: WordList, streams: Streams, *, kept: 
     defaults = {name: option.default for name, option in ngram.OPTIONS.items()}
     own = {name: value for name, value in options.values.items() if name in defaults and name not in kept}
     length = options["bayes"] if options["bayes"] is not None else max(1, options["order"])
-    return Models(Parsed({**defaults, **own, "bayes": length}), words, streams).scorer()
+    # What stands around models, and classes of several words, are no options of decoders.
+    return cast(SightedScorer, Models(Parsed({**defaults, **own, "bayes": length}), words, streams).scorer())
 
 
 def observed_text(

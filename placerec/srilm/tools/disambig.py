@@ -114,7 +114,7 @@ class _Run:
 
     def step(self, i: int, choices: Choices, contexts: Ints) -> tuple[Step, Ints]:
         """Position number i behind contexts (S,), and the contexts of the states there, which end in hidden words."""
-        log10_p, behind = self.histories.after(contexts, list(choices), remembered=True)
+        log10_p, behind = self.histories.after(contexts, list(choices))
         log10_p = np.where(np.isneginf(log10_p), _NEVER, log10_p)
         local = self.local(choices)
         if i and self.options["debug"] >= 2:
@@ -131,7 +131,7 @@ class _Run:
         local = values if self.options["logmap"] else np.log10(values)
         local = local.astype(np.float32)
         if self.options["scale"]:
-            single, _ = self.histories.after(np.zeros(1, np.int64), list(choices), remembered=True)
+            single, _ = self.histories.after(np.zeros(1, np.int64), list(choices))
             local = np.where(np.isneginf(single[:, 0]), local, local - single[:, 0])
         return local.astype(np.float64)
 

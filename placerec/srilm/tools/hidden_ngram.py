@@ -139,7 +139,7 @@ class _Run:
 
     def transitions(self, contexts: Ints, word: int, events: Choices, *, first: bool) -> tuple[Singles, Singles, Ints]:
         """log10 p of a word after contexts (S,), of the events behind it (A, S), and the contexts then (A, S)."""
-        log10_p, after = self.histories.after(contexts, [word], remembered=True)
+        log10_p, after = self.histories.after(contexts, [word])
         word_p = np.zeros_like(log10_p[0]) if first else self.at_cost(log10_p[0])
         event_p = np.zeros((len(events), len(contexts)), np.float32)
         behind = np.tile(after, (len(events), 1))
@@ -149,7 +149,7 @@ class _Run:
             # Mixtures weigh the models by what stands before an event, however much of it the models use.
             known = self.histories.contexts
             whole = [self.histories.number((*known[context], word)) for context in contexts.tolist()]
-            its_p, behind[rows] = self.histories.after(np.array(whole, np.int64), real, remembered=True)
+            its_p, behind[rows] = self.histories.after(np.array(whole, np.int64), real)
             event_p[rows] = self.at_cost(its_p)
         return word_p, event_p, behind
 
