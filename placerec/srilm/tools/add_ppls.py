@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from placerec.lm.perplexity import Totals
 from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
+from placerec.srilm.tools.assignments import HELP
 
 TOOL = "add-ppls"
 USAGE = "usage: {tool} [PPL ...]  (outputs of ngram -ppl; default: standard input)"
@@ -18,7 +19,7 @@ _SECOND = re.compile(rf"{_NUMBER} zeroprobs, logprob= {_NUMBER} ")
 @exit_status
 def add_ppls(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -> int:
     """Add up the `file NAME:` blocks of all files and print their total; returns the exit status."""
-    if arguments and arguments[0] in ("-help", "-?", "--help", "-h"):
+    if arguments and arguments[0] in HELP:
         raise SrilmError(USAGE.format(tool=tool), 0)
     print_total(totals_of(arguments or ["-"], streams), streams)
     return 0

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from placerec.srilm.text.streams import SrilmError, Streams
 
+HELP = ("-help", "-?", "--help", "-h")
 _BLOCK = 1 << 19
 _ASSIGNMENT = re.compile(r"([A-Za-z_]\w*)=(.*)", re.DOTALL)
 
@@ -14,7 +15,7 @@ def split_assignments(arguments: Sequence[str], usage: str) -> tuple[dict[str, s
 
     As with gawk, an assignment holds wherever it stands, and one of no known name does nothing.
     """
-    if arguments and arguments[0] in ("-help", "-?", "--help", "-h"):
+    if arguments and arguments[0] in HELP:
         raise SrilmError(usage, 0)
     values: dict[str, str] = {}
     files = []

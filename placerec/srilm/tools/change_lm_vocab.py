@@ -7,10 +7,10 @@ from io import BytesIO
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
 from placerec.srilm.text.vocabulary import WordList
+from placerec.srilm.tools.assignments import records
 
 TOOL = "change-lm-vocab"
 USAGE = "usage: {tool} -vocab FILE [-lm FILE] [-write-lm FILE] [-subset] [-tolower] [options of ngram]"
-_BLOCK = 1 << 19
 _SECTION = re.compile(r"\\(\d{1,18})-grams", re.ASCII)
 
 
@@ -27,10 +27,8 @@ def change_lm_vocab(arguments: Sequence[str], streams: Streams, tool: str = TOOL
     words = WordList(lower="tolower" in flags)
     # Whole lines, of which ngram takes the first words: n-grams of a word that does not stand alone there go.
     listed = {SENTENCE_START, SENTENCE_END, *map(words.normal, streams.lines(values["vocab"]))}
-    blocks = streams.lines(values.get("lm", "-")).blocks(_BLOCK)
     # With the empty lines: ngram's messages count them.
-    lines = (line for block in blocks for line in block.decode("latin-1").removesuffix("\n").split("\n"))
-    filtered = restricted(lines, listed, words)
+    filtered = restricted(records(values.get("lm", "-"), streams), listed, words)
     inner = Streams(BytesIO(filtered.encode("latin-1")), streams.stdout, streams.stderr)
     vocabulary = [] if "subset" in flags else ["-vocab", values["vocab"]]
     lower = ["-tolower"] if "tolower" in flags else []

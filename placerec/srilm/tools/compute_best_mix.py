@@ -11,6 +11,7 @@ from placerec.arrays import Floats
 from placerec.lm.logs import LEAST_LOG10, LN10
 from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
+from placerec.srilm.tools.assignments import HELP
 
 TOOL = "compute-best-mix"
 USAGE = 'usage: {tool} [lambda="L1 L2 ..."] [precision=P] PPL1 PPL2 ...  (outputs of ngram -debug 2 -ppl)'
@@ -24,7 +25,7 @@ def compute_best_mix(arguments: Sequence[str], streams: Streams, tool: str = TOO
     """Find the weights, tell each step on stderr and the result on stdout; returns the exit status."""
     settings = dict(argument.split("=", 1) for argument in arguments if re.match(r"(lambda|precision)=", argument))
     names = [argument for argument in arguments if not re.match(r"(lambda|precision)=", argument)]
-    if not names or names[0] in ("-help", "-?", "--help", "-h"):
+    if not names or names[0] in HELP:
         raise SrilmError(USAGE.format(tool=tool), 0 if names else 2)
     precision = leading_float(settings.get("precision", "0.001"))
     if precision is None or not precision > 0:

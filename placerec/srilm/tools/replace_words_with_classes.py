@@ -10,7 +10,7 @@ from placerec.srilm.tools.assignments import records, split_assignments
 
 TOOL = "replace-words-with-classes"
 USAGE = (
-    "usage: {tool} classes=FILE [outfile=FILE] [normalize=0|1] [addone=K] [have_counts=1] [partial=1] [TEXT ...]"
+    "usage: {tool} classes=FILE [outfile=FILE] [normalize=0|1] [addone=K] [have_counts=1] [TEXT ...]"
     "  (default: standard input)"
 )
 Expansions = dict[tuple[str, ...], str]
