@@ -39,4 +39,4 @@ def printed_cost(merger: Merger, kept: int, gone: int, order: Ints) -> float:
 
 def _sum(*terms: Floats) -> float:
     """One after the other, each sum rounded to float32."""
-    return float(np.cumsum(np.concatenate(terms).astype(np.float32), dtype=np.float32)[-1]) if terms else 0.0
+    return float(np.cumsum(np.concatenate(terms).astype(np.float32), dtype=np.float32)[-1])
