@@ -186,14 +186,15 @@ def _in_source(source: Path, options: SourceOptions) -> list[_Found]:
     if not source.is_dir():
         raise SourceError(f"{source}: is a file of no kind that is read; name a folder of {WANTED}, or {RECORDED}")
     # ImageFolder's splits hold a folder a place.
-    splits = list_folder(source).folders
+    listing = list_folder(source)
+    splits = listing.folders
     roots = [source / name for name in splits] if splits and SPLITS.issuperset(splits) else [source]
     if options.format == "places":
         return [place for root in roots for place in _place_folders(root)]
     if _absolute(source).name == COLD_CAMERA:
         found = [_camera(source.parent, source)]
     else:
-        found = _below(source, options.camera)
+        found = _below(source, options.camera, listing)
     found = _without_aliases(found)
     if not found:
         wanted = f"{COLD_CAMERA}/, {WANTED}, {RECORDED}"
@@ -209,12 +210,17 @@ def _in_source(source: Path, options: SourceOptions) -> list[_Found]:
     return found
 
 
-def _below(folder: Path, camera: str | None, depth: int = 0, seen: frozenset[str] = frozenset()) -> list[_Found]:
-    """The sequences at and below a folder. `seen`: the real paths above it, where a loop of links would lead back."""
+def _below(
+    folder: Path, camera: str | None, listing: Listing | None = None, depth: int = 0, seen: frozenset[str] = frozenset()
+) -> list[_Found]:
+    """The sequences at and below a folder; `listing`: what is in it, if that is known.
+
+    `seen`: the real paths above it, where a loop of links would lead back.
+    """
     real = os.path.realpath(folder)
     if real in seen or depth > MAX_DEPTH:
         return []
-    listing = list_folder(folder)
+    listing = listing or list_folder(folder)
     if COLD_CAMERA in listing.folders:
         return [_camera(folder, folder / COLD_CAMERA)]
     if is_bag(folder):
@@ -240,7 +246,9 @@ def _below(folder: Path, camera: str | None, depth: int = 0, seen: frozenset[str
         if is_depth(name):
             log.warning("%s: depth is no picture; not read", path)
             continue
-        below += [_Found(path, path)] if name in listing.recordings else _below(path, camera, depth + 1, seen | {real})
+        below += (
+            [_Found(path, path)] if name in listing.recordings else _below(path, camera, None, depth + 1, seen | {real})
+        )
     if below and itself:
         # Maps and previews lie beside sequences more often than sequences hold folders of images.
         log.warning("%s: holds sequences; %d images beside them not read", folder, len(listing.images))

@@ -9,7 +9,7 @@ import pytest
 
 from placerec.errors import SourceError
 from placerec.frames import SourceOptions, find_sequences
-from placerec.frames.folder import WANTED, natural_key
+from placerec.frames.folder import WANTED, Listing, list_folder, natural_key
 from placerec.frames.recordings import WANTED as RECORDED
 
 
@@ -54,6 +54,20 @@ def test_folder_of_images(tmp_path: Path) -> None:
     assert sequence.name == "run"
     assert sequence.source == tmp_path / "run"
     assert sequence.frames[0].path == tmp_path / "run/a.webp"
+
+
+def test_a_folder_is_listed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hundreds of thousands of names come from a disk, or over a network."""
+    make(tmp_path, "run/1.png", "run/2.png")
+    listed: list[Path] = []
+
+    def listing(folder: Path) -> Listing:
+        listed.append(folder)
+        return list_folder(folder)
+
+    monkeypatch.setattr("placerec.frames.find.list_folder", listing)
+    find_sequences([tmp_path])
+    assert listed == [tmp_path, tmp_path / "run"]
 
 
 @pytest.mark.parametrize("place", ["places.lst", "localization/places.lst"])
