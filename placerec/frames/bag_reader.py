@@ -135,8 +135,9 @@ def _open(path: Path) -> Any:
     reader = McapReader(path)
     try:
         reader.open()
-    except Exception:
-        raise refused from None
+    except Exception as error:
+        # Of another profile rosbags says that alone, of what is damaged in it only `mcap` knows.
+        raise (refused if profile == "ros2" else error) from None
     return reader
 
 

@@ -172,6 +172,7 @@ def test_a_whole_file_is_never_to_be_recovered(tmp_path: Path) -> None:
     for name, profile in (("a.mcap", ""), ("b.mcap", "ros2")):
         short = cut(write(path, profile, schema, "json", [as_json(i) for i in range(6)]), 0.6, name)
         assert failure(short).endswith("; mend it with `mcap recover`, or remove it")
+        assert "rofile" not in failure(short)
     # Of profile ros2, with what ROS 2 has not.
     check(write(path, "ros2", schema, "json", [as_json(i) for i in range(6)]), expected(tmp_path))
 
