@@ -13,7 +13,17 @@ import numpy as np
 from placerec.errors import SourceError
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
-from placerec.frames.folder import EMPTY, WANTED, FileFrames, Listing, is_text, list_folder, natural_key, read_frames
+from placerec.frames.folder import (
+    EMPTY,
+    WANTED,
+    FileFrames,
+    Listing,
+    is_image,
+    is_text,
+    list_folder,
+    natural_key,
+    read_frames,
+)
 from placerec.frames.image_list import LIST_NAME, STDIN, read_list
 from placerec.frames.intervals import Intervals, find_intervals
 from placerec.frames.layouts import (
@@ -183,6 +193,8 @@ def _in_source(source: Path, options: SourceOptions) -> list[_Found]:
         raise SourceError(f"{source}: no such file or folder")
     if is_recording(source):
         return [_Found(source, source)]
+    if is_image(source):
+        raise SourceError(f"{source}: is one image; name its folder, or a list of images (`-`)")
     if not source.is_dir():
         raise SourceError(f"{source}: is a file of no kind that is read; name a folder of {WANTED}, or {RECORDED}")
     # ImageFolder's splits hold a folder a place.

@@ -134,13 +134,18 @@ def list_folder(folder: Path) -> Listing:
     return Listing(tuple(images), tuple(recordings), ordered, tuple(sorted(labels)), ", and ".join(said))
 
 
+def is_image(path: Path) -> bool:
+    """Whether a path is called as an image is, and is no folder."""
+    return path.name.lower().endswith(SUFFIXES) and not path.is_dir()
+
+
 def holds_images(path: Path, depth: int) -> bool:
     """Whether a path is an image or a recording by name, or a folder with one in it or at most `depth` folders deeper.
 
     Raises SourceError for a folder that cannot be read.
     """
     if not path.is_dir():
-        return path.name.lower().endswith(SUFFIXES) or _is_recording(path)
+        return is_image(path) or _is_recording(path)
     listing = list_folder(path)
     if listing.images or listing.recordings:
         return True

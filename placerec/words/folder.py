@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from placerec.errors import StreamError, at, refuse_string
 from placerec.files import all_lines, encoded, read_text, whole_folder, write_text
 from placerec.frames.find import MAX_DEPTH
-from placerec.frames.folder import holds_images
+from placerec.frames.folder import holds_images, is_image
 from placerec.frames.naming import unique_names
 from placerec.version import __version__
 from placerec.words.stream import (
@@ -84,8 +84,8 @@ def no_streams(source: Path, missing: str) -> StreamError:
     """
     if not holds_images(source, MAX_DEPTH):
         return StreamError(f"{source}: {missing}; `placerec tokenize` makes token streams of images")
-    what = "images" if source.is_dir() else "an image or a recording"
-    command = f"placerec tokenize {source} -w words.npz -o tokens/"
+    what = "images" if source.is_dir() else "one image" if is_image(source) else "a recording"
+    command = f"placerec tokenize {source.parent if is_image(source) else source} -w words.npz -o tokens/"
     return StreamError(f"{source}: {missing}, but {what}; `{command}` makes token streams of that")
 
 

@@ -250,6 +250,10 @@ def test_sources_that_are_none(tmp_path: Path) -> None:
     assert failure(tmp_path / "absent") == f"{tmp_path / 'absent'}: no such file or folder"
     assert failure(tmp_path / "void") == f"{tmp_path / 'void'}: {looked}"
     assert failure(tmp_path / "notes") == f"{tmp_path / 'notes'}: {looked}"
+    make(tmp_path, "run/1.JPG")
+    assert failure(tmp_path / "run/1.JPG") == (
+        f"{tmp_path / 'run/1.JPG'}: is one image; name its folder, or a list of images (`-`)"
+    )
     text = f"is a file of no kind that is read; name a folder of {WANTED}, or {RECORDED}"
     assert failure(tmp_path / "notes/readme.txt") == f"{tmp_path / 'notes/readme.txt'}: {text}"
     assert failure(tmp_path) == f"{tmp_path / 'seq/std_cam'}: holds no image; looked for {WANTED}"

@@ -104,7 +104,11 @@ def test_missing_things_are_named(tmp_path: Path) -> None:
         said = folder_of.format(top)
         refused(f"{top}: holds neither token streams (.tsv) nor sentences (PLACE.txt), {said}", top)
         refused(f"{top}: holds no token stream (.tsv), {said}", top, folder)
-        refused(f"{tmp_path / name}: is no token stream (.tsv), but an image or a recording", tmp_path / name)
+    image, video = tmp_path / "runs/run1/std_cam/1.jpeg", tmp_path / "phone/clip.mp4"
+    said = folder_of.format(image.parent).replace("images", "one image", 1)
+    refused(f"{image}: is no token stream (.tsv), {said}", image, image.with_name("2.jpeg"))
+    said = folder_of.format(video).replace("images", "a recording", 1)
+    refused(f"{video}: is no token stream (.tsv), {said}", video)
     refused("other.txt: no such file", run, vocabulary=tmp_path / "other.txt")
     refused("holds no word; one word a line is expected", run, vocabulary=write(tmp_path / "v.txt", "\n"))
     (folder / "vocab.txt").unlink()
