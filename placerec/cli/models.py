@@ -1,7 +1,6 @@
 """Models of places, and what they believe: from `placerec train-lm` and `update` to `decode` and `evaluate`."""
 
 import functools
-import json
 import sys
 from contextlib import closing
 from dataclasses import asdict
@@ -247,7 +246,7 @@ def check(models: tuple[Path, ...], as_json: bool) -> None:
         if not as_json:
             click.echo(checks[-1].sentence())
     if as_json:
-        click.echo(json.dumps([asdict(found) | {"ok": found.ok} for found in checks], indent=2))
+        shared.echo_json([asdict(found) | {"ok": found.ok} for found in checks])
     if not all(found.ok for found in checks):
         click.echo("placerec: a model is not as it should be; see above", err=True)
         sys.exit(1)
@@ -385,4 +384,4 @@ def evaluate(beliefs: tuple[Path, ...], as_json: bool, plot: Path | None) -> Non
     if _STDIN in beliefs and sys.stdin is None:
         raise click.UsageError("`-` reads standard input, and that is closed")
     evaluation = evaluate_files(beliefs, plot=plot)
-    click.echo(json.dumps(evaluation.to_json(), indent=2) if as_json else format_evaluation(evaluation))
+    shared.echo_json(evaluation.to_json()) if as_json else click.echo(format_evaluation(evaluation))

@@ -387,6 +387,11 @@ def test_evaluate_names_what_it_cannot_judge(world: Path, tmp_path: Path) -> Non
     fails(r"picture\.xyz: no kind of picture; let its name end", "evaluate", world / "beliefs", *plot)
 
 
+def test_json_has_names_as_they_are(world: Path, tmp_path: Path) -> None:
+    text = (world / "beliefs/run3.tsv").read_text().replace("kitchen", "k\u00fcche")
+    assert "k\u00fcche" in done("evaluate", "-", "--json", stdin=text.encode()).stdout
+
+
 def test_evaluate_reads_a_pipe(world: Path) -> None:
     text = (world / "beliefs/run3.tsv").read_text()
     piped = json.loads(done("evaluate", "-", "--json", stdin=text).stdout)
