@@ -1,30 +1,17 @@
-"""Classes of words: the golden runs of ngram-class, ngram -classes and two scripts, and what they must keep to."""
+"""Classes of words: what ngram-class, ngram -classes and two scripts must keep to."""
 
-import io
 import math
 import random
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.srilm_runs import Case, differences, golden_cases, prepare, stored
+from helpers.srilm_runs import call
 
 from placerec.lm.classes import ClassBigrams, Merger, class_log_likelihood
-from placerec.srilm.text.streams import Streams
-from placerec.srilm.tools.ngram import ngram
-from placerec.srilm.tools.ngram_class import ngram_class
-from placerec.srilm.tools.replace_words_with_classes import replace_words_with_classes
-from placerec.srilm.tools.uniform_classes import uniform_classes
 
-TOOLS: dict[str, Callable[[Sequence[str], Streams], int]] = {
-    "ngram-class": ngram_class,
-    "ngram": ngram,
-    "replace-words-with-classes": replace_words_with_classes,
-    "uniform-classes": uniform_classes,
-}
 LM = """
 \\data\\
 ngram 1=5
@@ -45,45 +32,6 @@ ngram 2=4
 
 \\end\\
 """
-
-
-def call(tool: str, *arguments: str, stdin: bytes = b"") -> tuple[int, str, str]:
-    streams = Streams(io.BytesIO(stdin), out := io.BytesIO(), err := io.BytesIO())
-    status = TOOLS[tool](arguments, streams)
-    return status, out.getvalue().decode("latin-1"), err.getvalue().decode("latin-1")
-
-
-def is_of_classes(case: Case) -> bool:
-    return str(case["id"]).startswith(("cls-", "ngc-", "rep-", "uni-"))
-
-
-@pytest.mark.parametrize(
-    ("tool", "least"),
-    [("ngram-class", 18), ("ngram", 14), ("replace-words-with-classes", 5), ("uniform-classes", 2)],
-)
-def test_golden_runs_are_identical(
-    tool: str, least: int, shared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    golden = shared / "srilm/tools/golden"
-    cases = [case for case in golden_cases(golden, tool) if is_of_classes(case)]
-    assert len(cases) >= least
-    wrong = {}
-    for case in cases:
-        folder = tmp_path / case["id"]
-        folder.mkdir()
-        monkeypatch.chdir(folder)
-        stdin = prepare(case, golden, folder)
-        out, err = io.BytesIO(), io.BytesIO()
-        status = TOOLS[tool](case["args"], Streams(io.BytesIO(stdin), out, err))
-        if "awk-order" in case["tags"]:
-            # The order of a gawk array is nobody's promise.
-            for name in case["outputs"]:
-                expected = stored(golden, f"expected/{case['id']}/{name}")
-                assert sorted((folder / name).read_bytes().split(b"\n")) == sorted(expected.split(b"\n"))
-            case = {**case, "outputs": []}
-        if found := differences(case, golden, folder, status, out.getvalue(), err.getvalue()):
-            wrong[case["id"]] = found
-    assert not wrong
 
 
 def random_bigrams(size: int, seed: int) -> tuple[np.ndarray, ClassBigrams]:
@@ -258,10 +206,8 @@ def test_sums_over_all_words_are_one(tmp_path: Path) -> None:
     text.write_text("a b c\nb a c a\nc c b\n" * 9)
     counts, classes, model = (tmp_path / name for name in ("n", "c", "m"))
     call("ngram-class", "-text", str(text), "-numclasses", "2", "-class-counts", str(counts), "-classes", str(classes))
-    from placerec.srilm.tools.ngram_count import ngram_count
-
     arguments = ["-read", str(counts), "-order", "2", "-wbdiscount", "-lm", str(model)]
-    assert ngram_count(arguments, Streams(io.BytesIO(), io.BytesIO(), io.BytesIO())) == 0
+    assert call("ngram-count", *arguments)[0] == 0
     for more in ([], ["-simple-classes"]):
         arguments = [
             "-lm",
