@@ -20,18 +20,19 @@ def options_of(tool: str) -> Options:
 
 def rows(options: Options) -> list[str]:
     """One row for each option; those that differ only in a digit share one, `gtNmin` stands for gt1min to gt9min."""
-    families: dict[str, list[str]] = {}
-    for name in options:
-        families.setdefault(re.sub(r"\d", "N", name), []).append(name)
+    families: dict[tuple[str, str], list[str]] = {}
+    for name, option in options.items():
+        digit = re.sub(r"\D", "", name)
+        text = option.help.replace(digit, "N") if digit else option.help
+        families.setdefault((re.sub(r"\d", "N", name), text), []).append(name)
     lines = []
-    for family, names in sorted(families.items()):
+    for (family, text), names in sorted(families.items(), key=lambda item: (item[0][0], item[1])):
         digits = [re.sub(r"\D", "", name) for name in names]
         option = options[names[0]]
         value = {"flag": "", "string": " TEXT", "float": " REAL"}.get(option.kind, " NUMBER")
         which = f" (N = {digits[0]} .. {digits[-1]})" if len(names) > 1 else ""
         name = family if len(names) > 1 else names[0]
-        text = option.help.replace(digits[0], "N") if len(names) > 1 else option.help
-        text = re.sub(r"</?\w+>", r"`\g<0>`", text)
+        text = re.sub(r"</?\w+>", r"`\g<0>`", text if len(names) > 1 else option.help)
         lines.append(f"| `-{name}{value}`{which} | {'refused' if option.refused else 'works'} | {text} |")
     return lines
 
