@@ -7,8 +7,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints
 from placerec.errors import LanguageModelError
-from placerec.files import all_lines
-from placerec.lm.arpa import read_arpa, write_arpa
+from placerec.lm.arpa import first_comment, read_arpa, write_arpa
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.check import SUM_TOLERANCE, context_sums
 from placerec.lm.logs import log10, p_of
@@ -29,8 +28,7 @@ def adapt_lm(path: Path | str, out: Path | str, add: Mapping[str, float | None],
         adapted = adapt(model, add, boost)
     except LanguageModelError as error:
         raise LanguageModelError(f"{path}: {error}") from error
-    first = all_lines(path, LanguageModelError)[0]
-    write_arpa(adapted, out, comment=first.removeprefix("#").strip() if first.startswith("#") else "")
+    write_arpa(adapted, out, comment=first_comment(path).removeprefix("#").strip())
     return adapted
 
 

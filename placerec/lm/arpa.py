@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import LanguageModelError, at, refuse_string
-from placerec.files import read_text, write_text
+from placerec.files import read_lines, read_text, write_text
 from placerec.lm.arpa_text import first_lines
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.logs import LOG_ZERO
@@ -171,6 +171,12 @@ def read_arpa(path: Path | str, *, tolerant: bool = True) -> BackoffModel:
             raise LanguageModelError(complaint)
         log.warning("%s (KenLM would refuse the file)", complaint)
     return model
+
+
+def first_comment(path: Path | str) -> str:
+    """The first line of an ARPA file if it is a comment, which starts with #; else an empty text."""
+    line = next(read_lines(Path(path), LanguageModelError), "")
+    return line if line.startswith("#") else ""
 
 
 def read_with_complaint(path: Path | str) -> tuple[BackoffModel, str]:

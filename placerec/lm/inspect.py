@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from placerec.errors import LanguageModelError, refuse_string
-from placerec.files import read_text
-from placerec.lm.arpa import arpa_files, read_with_complaint
+from placerec.lm.arpa import arpa_files, first_comment, read_with_complaint
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.check import context_sums, power_of_ten
 from placerec.lm.score import Contexts
@@ -49,14 +48,13 @@ def inspect_models(folder: Path | str, ngrams: Sequence[str] = (), *, top: int =
 def _inspected(path: Path | str, model: BackoffModel, refused: str, ngrams: Sequence[str], top: int) -> dict[str, Any]:
     orders = range(1, model.listed_order + 1)
     sums = np.concatenate([totals for _, _, totals in context_sums(model)])
-    comment = read_text(Path(path), LanguageModelError).partition("\n")[0]
     try:
         explained = [explain(model, ngram.split(), top=top) for ngram in ngrams]
     except LanguageModelError as error:
         raise LanguageModelError(f"{path}: {error}") from error
     return {
         "path": str(path),
-        "comment": comment if comment.startswith("#") else "",
+        "comment": first_comment(path),
         "refused_by_kenlm": refused,
         "order": model.listed_order,
         "ngrams_per_order": [len(model.trie.keys[n - 1]) for n in orders],
