@@ -328,15 +328,13 @@ def _without_aliases(found: list[_Found]) -> list[_Found]:
 
 
 def _looks_like_places(roots: list[Path], found: list[_Found]) -> bool:
-    # A folder in a folder of the same name is how some archives unpack, and no place; nor is one folder alone.
-    names = {_absolute(root).name for root in roots}
     return (
+        # One folder alone is no place: some archives unpack so.
         len({item.folder.name for item in found}) > 1
         and all(find_places_list(root) is None for root in roots)
         and all(
             item.folder == item.camera
             and item.camera.parent in roots
-            and item.folder.name not in names
             and not RUN_NAME.fullmatch(item.folder.name)
             and item.places is None
             and not item.cameras

@@ -204,9 +204,7 @@ def write_dictionaries(path: Path, dictionaries: tuple[Dictionary, ...]) -> None
     members = []
     for one in dictionaries:
         view = views.setdefault(id(one.pca), view_of(one.name))
-        if one is not first:
-            arrays |= _named(_of_pca(one.pca), view) if view else {}
-            arrays |= _named({"codebook": one.codebook, "hits": one.hits}, one.name)
+        arrays |= _named(_of_pca(one.pca), view) | _named({"codebook": one.codebook, "hits": one.hits}, one.name)
         told = {"training": asdict(one.training), "quality": asdict(one.quality)}
         members.append({"name": one.name, "projection": view, **told})
     write_npz(path, arrays, {**meta, "version": SEVERAL, "dictionaries": members})

@@ -5,6 +5,7 @@ import json
 import pickle
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,7 @@ def check(path: Path, levels: list[Any]) -> None:
     assert all(map(np.array_equal, read_images(pickle.loads(pickle.dumps(sequence)), 2), levels[2:]))  # noqa: S301
 
 
-def ros(compressed: bool, ros1: bool) -> list[bytes]:
+def ros(compressed: bool, ros1: bool, *, little: bool = True) -> list[bytes]:
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST)
@@ -75,7 +76,8 @@ def ros(compressed: bool, ros1: bool) -> list[bytes]:
             fields = {"height": 48, "width": 64, "encoding": "bgr8", "is_bigendian": 0, "step": 192}
             fields["data"] = shown.reshape(-1)
         message = store.types[kind](header=header, **fields)
-        made.append(bytes(store.serialize_ros1(message, kind) if ros1 else store.serialize_cdr(message, kind)))
+        cdr = partial(store.serialize_cdr, little_endian=little)
+        made.append(bytes((store.serialize_ros1 if ros1 else cdr)(message, kind)))
     return made
 
 
@@ -88,6 +90,13 @@ def test_short_names_of_ros_under_any_profile(tmp_path: Path, compressed: bool, 
     schema = (name, "ros1msg" if ros1 else "ros2msg", b"std_msgs/Header header\n")
     path = write(tmp_path / "run.mcap", profile, schema, "ros1" if ros1 else "cdr", ros(compressed, ros1))
     check(path, expected(tmp_path) if compressed else grays(SHOWN))
+
+
+def test_messages_of_a_machine_with_the_other_order_of_bytes(tmp_path: Path) -> None:
+    schema = ("sensor_msgs/msg/CompressedImage", "ros2msg", b"std_msgs/Header header\n")
+    for profile in ("ros2", ""):
+        path = write(tmp_path / "run.mcap", profile, schema, "cdr", ros(True, False, little=False))
+        check(path, expected(tmp_path))
 
 
 def as_json(i: int) -> bytes:
@@ -202,8 +211,13 @@ def test_a_file_without_an_index_is_read(tmp_path: Path) -> None:
 
 def test_without_mcap_it_is_said_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "run.mcap", "", ("foxglove.CompressedImage", "jsonschema", b"{}"), "json", [as_json(0)])
+    schema = ("sensor_msgs/msg/CompressedImage", "ros2msg", b"std_msgs/Header header\n")
+    whole = write(tmp_path / "whole.mcap", "ros2", schema, "cdr", ros(True, False))
     for name in [name for name in sys.modules if name.split(".")[0] == "mcap"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "mcap", None)
     with pytest.raises(MissingExtraError, match="an MCAP file of profile '' needs the package mcap,"):
         find_one(path)
+    # What is damaged needs no other reader.
+    short = cut(whole, 0.6, "short.mcap")
+    assert failure(short).endswith("; mend it with `mcap recover`, or remove it")

@@ -167,6 +167,22 @@ def test_sensor_and_run_folders_are_no_places(tmp_path: Path, caplog: pytest.Log
     assert [found.frames[0].place for found in asked] == ["kitchen"]
 
 
+def test_folders_with_lists_of_times_are_no_places(tmp_path: Path) -> None:
+    for name in ("monday", "tuesday"):
+        lay(tmp_path / name, NUMBERED)
+        (tmp_path / name / "times.txt").write_text("".join(f"{t}\n" for t in STEPS))
+    found = find_sequences([tmp_path])
+    assert [(sequence.name, steps(sequence)) for sequence in found] == [("monday", STEPS), ("tuesday", STEPS)]
+    assert {frame.place for sequence in found for frame in sequence.frames} == {""}
+
+
+def test_one_camera_in_all_names_is_no_run_of_several(tmp_path: Path) -> None:
+    for place in ("kitchen", "office"):
+        lay(tmp_path / place, [f"{i}.color.png" for i in range(3)])
+    found = find_sequences([tmp_path])
+    assert [{frame.place for frame in sequence.frames} for sequence in found] == [{"kitchen"}, {"office"}]
+
+
 def test_depth_is_never_read_unless_it_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     lay(tmp_path / "run/depth", ["1.png"])
     with pytest.raises(SourceError, match="no sequence there"):

@@ -122,6 +122,9 @@ def test_a_part_of_images(tmp_path: Path) -> None:
     where = tmp_path / "b"
     assert str(error.value) == f"{where}: its frames have no times, by which --from and --to go; give --rate HZ"
     assert times(tmp_path / "c", [f"{i}.png" for i in range(5)], begin=1, end=2, rate=2) == [1, 1.5]
+    # Differences of seconds since 1970 are off in the seventh digit.
+    stamps = [f"1305031102.{i}00000" for i in range(1, 10)]
+    assert times(tmp_path / "d", [f"{stamp}.png" for stamp in stamps], begin=0.3, end=0.6) == [*map(float, stamps[3:6])]
 
 
 def test_a_camera_has_no_parts() -> None:

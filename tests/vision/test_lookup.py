@@ -61,6 +61,14 @@ def test_of_equally_near_units_the_first_answers(several: DictionarySet) -> None
     assert twice.words(rows)[1][0].max() < 20
 
 
+def test_units_within_rounding_of_each_other_are_told_apart(several: DictionarySet) -> None:
+    first, second, *others = several.dictionaries
+    codebook = second.codebook.copy()
+    codebook[20:] = np.nextafter(codebook[:16], np.float32(np.inf))
+    close = DictionarySet((first, replace(second, codebook=codebook, hits=np.maximum(second.hits, 1)), *others))
+    check_rows(close, sample(200, 5))
+
+
 def test_dictionaries_of_unlike_projections_are_looked_up_one_by_one(several: DictionarySet) -> None:
     first, second, third, fourth = several.dictionaries
     elsewhere = replace(second, pca=replace(second.pca, mean=second.pca.mean + 0.01))

@@ -156,6 +156,13 @@ def test_the_quantisation_error_falls_and_is_reported() -> None:
     assert final == pytest.approx(brute_force(codes, som.codebook).min(axis=1).mean())
 
 
+def test_the_error_that_is_told_is_of_all_frames() -> None:
+    codes, seen = sample(2 * CHUNK + 100), []
+    train(codes, size=3, epochs=2, progress=lambda *told: seen.append(told))
+    before = train(codes, size=3, epochs=1).codebook
+    assert seen[1][2] == pytest.approx(brute_force(codes, before).min(axis=1).mean())
+
+
 def test_training_stops_when_settled_and_not_in_the_cooling_half() -> None:
     som = train(sample(200), size=3)
     assert 25 < som.epochs < 50
