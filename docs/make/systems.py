@@ -4,7 +4,7 @@ python docs/make/systems.py DATA/SET... -o docs/systems [--test GLOB ...] [--siz
 
 Sequences that a GLOB names are tested together, all others train; in a set without any, each sequence is tested in turn
 and the others train. For every set: methods.csv (means over the maps; latency is a mean of medians), pairs.csv and
-methods.png as `placerec compare` writes them, with intervals over the test sequences of all folds; a sequence counts
+methods.svg as `placerec compare` writes them, with intervals over the test sequences of all folds; a sequence counts
 with its mean over the maps. A run that was stopped goes on where it was: what is done is in DIR.
 """
 
@@ -20,13 +20,13 @@ import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
 from placerec.experiments.comparison.benchmark import COMPARED, FrontEndCost, MethodRun
+from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.results import (
     Comparison,
     MethodScore,
     format_methods,
     format_pairs,
     judge,
-    plot_comparison,
 )
 from placerec.experiments.comparison.run import SIZE, compare
 from placerec.files import write_text
@@ -126,6 +126,6 @@ if __name__ == "__main__":
         result = compared(data, options.test, options.size, options.work)
         write_text(options.out / data.name / "methods.csv", format_methods(result.scores))
         write_text(options.out / data.name / "pairs.csv", format_pairs(result.pairs))
-        plot_comparison(result, options.out / data.name / "methods.png")
+        plot_comparison(result, options.out / data.name / "methods.svg")
         sys.stdout.write(table(data, result))
         sys.stdout.flush()

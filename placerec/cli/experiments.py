@@ -30,7 +30,7 @@ from placerec.cli import shared
 )
 @shared.reading_options()
 @shared.output_option(
-    "out/", "The folder to write: methods.csv, pairs.csv, methods.png, beliefs/; a second run goes on there."
+    "out/", "The folder to write: methods.csv, pairs.csv, methods.png and .svg, beliefs/; a second run goes on there."
 )
 @shared.talk_options
 def compare(train: tuple[Path, ...], tests: tuple[Path, ...], methods: str | None, out: Path, **how: Any) -> None:

@@ -32,6 +32,7 @@ def test_it_prints_a_table_and_writes_the_folder(runs: Path, tmp_path: Path) -> 
         "cache",
         "methods.csv",
         "methods.png",
+        "methods.svg",
         "pairs.csv",
     ]
 

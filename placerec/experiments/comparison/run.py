@@ -2,7 +2,7 @@
 
 OUT/methods.csv             a line per method
 OUT/pairs.csv               for every two methods whether their difference holds
-OUT/methods.png             accuracy against cost
+OUT/methods.png, .svg       accuracy and cost
 OUT/beliefs/METHOD/         the beliefs, one file per test sequence, and run.json: what they were made of
 OUT/cache/                  what a second run does not do again: descriptors, words, models
 """
@@ -25,7 +25,8 @@ from placerec.experiments.comparison.benchmark import (
     encode,
     train_models,
 )
-from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge, plot_comparison
+from placerec.experiments.comparison.figure import plot_comparison
+from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
 from placerec.experiments.comparison.several import learn_several
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
 from placerec.figures.canvas import check_figure
@@ -105,7 +106,8 @@ def compare(
         found = judge(runs, encoded[0].cost, seed)
         write_text(out / "methods.csv", format_methods(found.scores))
         write_text(out / "pairs.csv", format_pairs(found.pairs))
-        plot_comparison(found, out / "methods.png")
+        for suffix in (".png", ".svg"):
+            plot_comparison(found, out / f"methods{suffix}")
     _tell(out, found)
     return found
 
