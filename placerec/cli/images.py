@@ -1,6 +1,5 @@
 """Images and words: `placerec describe`, `train-words`, `tokenize`, `show-words`, `show-frame` and `stability`."""
 
-import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,71 +30,9 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
         describe_sources(sources, out, progress=progress, **how)
 
 
-def dictionary_options(function: shared.Command) -> shared.Command:
-    """--views, --size and what else dictionaries are learned with. The command gets `words`, the options."""
-
-    @click.option(
-        "--views",
-        metavar="VIEW,...",
-        callback=shared.listed(click.Choice(["plain", "pn"])),
-        default="plain,pn",
-        help="What maps see: principal components (plain), or these by how little the frames of one place differ (pn).",
-    )
-    @click.option(
-        "--size",
-        "--sizes",
-        "sizes",
-        metavar="N,...",
-        callback=shared.listed(click.IntRange(2, 200)),
-        default="10,20",
-        help="Sides of the maps: a dictionary of size x size words for each, in every view.",
-    )
-    @click.option("--components", type=click.IntRange(min=1), default=80, help="Principal components that a map sees.")
-    @shared.seed_option("Another seed, another map.")
-    @click.option(
-        "--fraction",
-        type=shared.FiniteRange(0, 1, min_open=True),
-        default=1.0,
-        help="Share of the frames to train on, drawn by the seed.",
-    )
-    @click.option(
-        "--epochs",
-        type=click.IntRange(min=1),
-        help="Passes over the frames.  [default: 50, or fewer if the words settle]",
-    )
-    @click.option(
-        "--units",
-        type=click.Choice(["live", "all"]),
-        default="live",
-        help="Whether units that no training frame hit can be words.",
-    )
-    @click.option(
-        "--rule",
-        type=click.Choice(["batch", "online"]),
-        default="batch",
-        help="All frames at once, or Kohonen's one after the other (slow, for comparison).",
-    )
-    @click.option(
-        "--width",
-        type=shared.FiniteRange(min=0, min_open=True),
-        default=0.5,
-        help="Final width of the neighbourhood, in units; it starts at size/2.",
-    )
-    @functools.wraps(function)
-    def learning(*args: Any, **options: Any) -> Any:
-        from dataclasses import fields
-
-        from placerec.vision import DictionarySetOptions
-
-        words = DictionarySetOptions(**{field.name: options.pop(field.name) for field in fields(DictionarySetOptions)})
-        return function(*args, words=words, **options)
-
-    return learning
-
-
 @click.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
 @shared.source_arguments
-@dictionary_options
+@shared.dictionary_options
 @shared.as_in_paper(
     "The paper's words: --views plain --size 10; options given beside it win.", views="plain", sizes="10"
 )

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from placerec.cli import images, models, shared
+from placerec.cli import shared
 
 
 @click.command("learn", epilog="Example: placerec learn RUNS/ -o model/ --test RUNS/run3")
@@ -17,8 +17,8 @@ from placerec.cli import images, models, shared
     type=shared.PATH,
     help="A run that trains nothing, and is decoded and judged; it may be one of RUNS.  [repeatable]",
 )
-@images.dictionary_options
-@models.model_options
+@shared.dictionary_options
+@shared.model_options
 @shared.descriptor_options
 @shared.output_option("MODEL/", "The folder to write: words.npz, tokens/, and all that train-lm writes.")
 @shared.work_options

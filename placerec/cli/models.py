@@ -1,6 +1,5 @@
 """Models of places, and what they believe: from `placerec train-lm` and `update` to `decode` and `evaluate`."""
 
-import functools
 import sys
 from contextlib import closing
 from dataclasses import asdict
@@ -15,12 +14,7 @@ from placerec.cli import shared
 if TYPE_CHECKING:
     from placerec.model import Decoding, ModelOptions
 
-# The names of placerec.lm.SMOOTHINGS and of placerec.methods.METHODS, written out: --help would wait for numpy.
-SMOOTHING_NAMES = tuple(
-    name + suffix
-    for name in ("witten-bell", "lidstone", "absolute", "kneser-ney", "modified-kneser-ney")
-    for suffix in ("", "-backoff")
-)
+# The names of placerec.methods.METHODS, written out: --help would wait for numpy.
 METHODS = (
     "majority",
     "naive-bayes",
@@ -41,61 +35,9 @@ Example: placerec inspect model/kitchen.arpa "w07 w08"
 _model_argument = click.argument("model", metavar="MODEL/", type=shared.PATH)
 
 
-def model_options(function: shared.Command) -> shared.Command:
-    """--order, --smoothing and what else language models are made with. The command gets `options`."""
-
-    @click.option("--order", type=click.IntRange(1, 9), default=2, help="n-gram order; 1 is the classical HMM.")
-    @click.option(
-        "--smoothing",
-        type=click.Choice(SMOOTHING_NAMES),
-        default="witten-bell",
-        help="How unseen n-grams get their probability.",
-    )
-    @click.option(
-        "--delta",
-        type=shared.FiniteRange(0, min_open=True),
-        help="What lidstone adds to every count  [default: 1], or absolute takes off it  [default: 0.5].",
-    )
-    @click.option(
-        "--select",
-        default="none",
-        metavar="RULE",
-        help="Which words count: none (all), unique (one a run), subsample:S (one in S), compress:M (runs by M).",
-    )
-    @click.option(
-        "--min-count",
-        default="1",
-        metavar="N[,N...]|srilm",
-        help="Per order, how often an n-gram must occur to be listed; srilm is 1,1,2.",
-    )
-    @click.option("--markers/--no-markers", default=False, help="Whether to count <s> and </s> around visits.")
-    @functools.wraps(function)
-    def modelling(
-        *args: Any,
-        order: int,
-        smoothing: str,
-        delta: float | None,
-        select: str,
-        min_count: str,
-        markers: bool,
-        **options: Any,
-    ) -> Any:
-        from placerec.model import ModelOptions, parse_min_count
-        from placerec.words import parse_selection
-
-        with shared.usage("--min-count"):
-            minima = parse_min_count(min_count)
-        with shared.usage("--select"):
-            selection = parse_selection(select)
-        chosen = ModelOptions(order, smoothing, delta, minima, markers, selection)
-        return function(*args, options=chosen, **options)
-
-    return modelling
-
-
 @click.command("train-lm", epilog="Example: placerec train-lm tokens/seq*[12].tsv -o model/ --order 2")
 @shared.tokens_argument
-@model_options
+@shared.model_options
 @click.option(
     "--vocab",
     "vocabulary",

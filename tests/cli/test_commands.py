@@ -12,7 +12,7 @@ from helpers.small_world import PLACES, run_through, write_tokens
 from helpers.typed_commands import SMALL, done, fails, make_words, misused, placerec
 
 from placerec.cli import commands
-from placerec.cli.models import SMOOTHING_NAMES
+from placerec.cli.shared import SMOOTHING_NAMES
 from placerec.lm import SMOOTHINGS
 from placerec.srilm.tools.run import TOOLS
 from placerec.words import write_stream

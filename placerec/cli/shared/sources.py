@@ -1,0 +1,85 @@
+"""SOURCE, TOKENS, and how they are read."""
+
+import functools
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any
+
+import click
+
+from placerec.cli.shared.values import PATH, PATH_OR_STREAM, Command, FiniteRange, usage
+
+tokens_argument = click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH)
+
+
+def source_arguments(function: Command) -> Command:
+    """SOURCE..., and how it is read. The command gets `sources` and `source_options`."""
+    function = reading_options()(function)
+    return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH_OR_STREAM)(function)
+
+
+def reading_options(note: str = "") -> Callable[[Command], Command]:
+    """--format, --every, --topic, --labels...: how sources are to be read. The command gets `source_options`."""
+
+    def decorated(function: Command) -> Command:
+        @click.option(
+            "--format",
+            "format_",
+            type=click.Choice(["auto", "sequences", "places"]),
+            default="auto",
+            help=f"What a folder of folders{note} is: sequences, or one folder per place.",
+        )
+        @click.option(
+            "--every", metavar="N", type=click.IntRange(min=1), default=1, help="Read the first of every N frames."
+        )
+        @click.option("--topic", metavar="NAME", help="The images of a bag to read, if it has several topics of them.")
+        @click.option(
+            "--labels",
+            metavar="FILE",
+            type=PATH,
+            help="Lines 'start end place' in seconds that label a video or a bag; or a folder of NAME.labels.  "
+            "[default: NAME.labels beside it]",
+        )
+        @click.option(
+            "--camera", metavar="NAME", help="The camera to read of a run of several.  [default: colour, or left]"
+        )
+        @click.option(
+            "--from",
+            "begin",
+            metavar="S",
+            type=FiniteRange(min=0),
+            default=0.0,
+            help="Read each sequence from this second on, counted from the first frame.",
+        )
+        @click.option(
+            "--to",
+            "end",
+            metavar="S",
+            type=FiniteRange(min=0, min_open=True),
+            help="Read no frame from this second on.",
+        )
+        @click.option(
+            "--rate",
+            metavar="HZ",
+            type=FiniteRange(min=0, min_open=True),
+            help="Frames a second, where images have no times.",
+        )
+        @click.option(
+            "--label-clock",
+            type=click.Choice(["auto", "stamps", "start"]),
+            default="auto",
+            help="What seconds in labels are: those of the frames' time stamps, or counted from the first frame.",
+        )
+        @functools.wraps(function)
+        def read(*args: Any, format_: str, **options: Any) -> Any:
+            from placerec.frames.sequence import SourceOptions
+
+            settings = {field.name: options.pop(field.name) for field in fields(SourceOptions) if field.name in options}
+            end = settings["end"]
+            with usage("--labels" if end is None or settings["begin"] < end else "--to"):
+                source_options = SourceOptions(format_, **settings)
+            return function(*args, source_options=source_options, **options)
+
+        return read
+
+    return decorated
