@@ -29,7 +29,7 @@ from placerec.lab.layout import render_lab
 
 PAGE = Path(__file__).parents[1] / "experiment.md"
 FOLDER = PAGE.with_suffix("")
-KEPT = ("results.csv", "sequences.csv", "figure.png", "figure-learned.png")
+KEPT = ("results.csv", "sequences.csv", "figure.svg", "figure-learned.svg")
 SYNTHETIC = "synthetic"
 SHARES = ("accuracy", "balanced_accuracy", "majority_accuracy", "same_word_run", "log_loss", "ece")
 TRANSITIONS = ("fixed", "learned")

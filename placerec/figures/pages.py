@@ -5,8 +5,10 @@ Every function takes plain text, escapes it and gives back HTML; `html_page` put
 
 import base64
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
+from typing import Literal
 
 from placerec.errors import EvaluationError
 
@@ -29,6 +31,11 @@ table { border-collapse: collapse; font-size: .95rem; font-variant-numeric: tabu
 th, td { padding: .3rem .9rem .3rem 0; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
 th { font-weight: 600; }
 .number { text-align: right; }
+.yes::before { content: "\\25cf  "; color: #009e73; }
+.no::before { content: "\\2715  "; color: #d55e00; }
+.open::before { content: "\\25cb  "; color: #cc79a7; }
+.yes { background: #009e7322; } .no { background: #d55e0022; } .open { background: #cc79a71a; }
+.none { color: var(--soft); }
 pre { background: var(--shade); border-radius: 4px; padding: .8rem 1rem; overflow-x: auto; font-size: .9rem;
       line-height: 1.5; font-family: ui-monospace, "SF Mono", Menlo, Consolas, "DejaVu Sans Mono", monospace; }
 @media screen and (max-width: 40rem) { figure > img { max-width: 46rem; } }
@@ -37,6 +44,10 @@ pre { background: var(--shade); border-radius: 4px; padding: .8rem 1rem; overflo
 
 # The browser itself then refuses whatever would leave the file.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+
+# What a cell of a table may be marked as.
+Mark = Literal["yes", "no", "open", "none"]
+_NO_MARKS: Mapping[str, Mark] = MappingProxyType({})
 
 _KINDS = ((b"\x89PNG\r\n\x1a\n", "image/png"), (b"\xff\xd8\xff", "image/jpeg"))
 
@@ -103,26 +114,29 @@ def _address(image: Path | str | bytes) -> str:
     return f"data:{kind or 'image/svg+xml'};base64,{base64.b64encode(data).decode('ascii')}"
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[object]], caption: str) -> str:
+def table(
+    header: Sequence[str], rows: Iterable[Sequence[object]], caption: str, *, marks: Mapping[str, Mark] = _NO_MARKS
+) -> str:
     """A table of texts and numbers; None is a dash, and columns without texts are set flush right.
 
-    Numbers are written by `str`: whoever knows their unit rounds them. Raises ValueError if a row has another length
-    than `header`.
+    Numbers are written by `str`: whoever knows their unit rounds them. Cells that hold a text of `marks` get a sign and
+    a colour. Raises ValueError if a row has another length than `header`.
     """
     body = [tuple(row) for row in rows]
     flush = [all(_numeric(row[column]) for row in body) for column in range(len(header))] if body else []
     lines = ["<figure><table>", f"<caption>{html.escape(caption)}</caption>"]
     lines.append(f"<thead>{_row(header, flush or [False] * len(header), 'th')}</thead>")
-    lines += ["<tbody>", *(_row(row, flush, "td") for row in body), "</tbody>", "</table></figure>"]
+    lines += ["<tbody>", *(_row(row, flush, "td", marks) for row in body), "</tbody>", "</table></figure>"]
     return "\n".join(lines)
 
 
-def _row(cells: Sequence[object], flush: Sequence[bool], tag: str) -> str:
+def _row(cells: Sequence[object], flush: Sequence[bool], tag: str, marks: Mapping[str, Mark] = _NO_MARKS) -> str:
     kind = f'{tag} scope="col"' if tag == "th" else tag
     texts = []
     for cell, right in zip(cells, flush, strict=True):
         text = "–" if cell is None else html.escape(str(cell))
-        texts.append(f'<{kind} class="number">{text}</{tag}>' if right else f"<{kind}>{text}</{tag}>")
+        look = marks.get(str(cell)) or ("number" if right else None)
+        texts.append(f'<{kind} class="{look}">{text}</{tag}>' if look else f"<{kind}>{text}</{tag}>")
     return f"<tr>{''.join(texts)}</tr>"
 
 

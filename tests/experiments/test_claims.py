@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from placerec.evaluation.bootstrap import draw
-from placerec.experiments.grid.claims import CANNOT_TELL, FAILS, HOLDS, judge
+from placerec.experiments.grid.claims import CANNOT_TELL, FAILS, HOLDS, NOT_TRIED, judge
 from placerec.experiments.grid.results import MissingCellsError, Results, Row, SequenceCount, scores
 
 SELECTS = ("none", "subsample:3", "subsample:5", "compress:3", "unique")
@@ -95,26 +95,27 @@ def test_sequences_that_disagree_cannot_tell() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lacking", "name", "reason"),
+    ("lacking", "name", "reason", "verdict"),
     [
-        ({"sizes": [10]}, "O1", "the grid has one size only"),
-        ({"selects": SELECTS[1:]}, "O2", "the grid has no select none"),
-        ({"selects": ["none"]}, "O2", "the grid has no select for it"),
-        ({"selects": ["none", "unique"]}, "O3", "the grid has no select subsample:3"),
-        ({"sizes": [10, 15]}, "O4", "the grid has no size 20"),
-        ({"selects": ["none", "unique"]}, "O5", "the grid has no select compress:3"),
-        ({"sizes": [20], "smoothings": ["witten-bell"]}, "O5", "nothing but S = 20 with Witten-Bell"),
-        ({"orders": [1, 2]}, "O6", "the grid has no two orders above 1"),
-        ({"orders": [2]}, "O7", "the grid has one order only"),
-        ({"smoothings": ["witten-bell"]}, "O8", "the grid has no smoothing lidstone-backoff or lidstone"),
-        ({"orders": [2, 3]}, "O9", "the grid has no order 1"),
-        ({"orders": [1, 2]}, "O10", "the grid has no order for it"),
-        ({"sequences": 5}, "O11", "5 test sequences; a verdict needs 6 or more"),
+        ({"sizes": [10]}, "O1", "the grid has one size only", NOT_TRIED),
+        ({"selects": SELECTS[1:]}, "O2", "the grid has no select none", NOT_TRIED),
+        ({"selects": ["none"]}, "O2", "the grid has no select for it", NOT_TRIED),
+        ({"selects": ["none", "unique"]}, "O3", "the grid has no select subsample:3", NOT_TRIED),
+        ({"sizes": [10, 15]}, "O4", "the grid has no size 20", CANNOT_TELL),
+        ({"selects": ["none", "unique"]}, "O5", "the grid has no select compress:3", NOT_TRIED),
+        ({"sizes": [20], "smoothings": ["witten-bell"]}, "O5", "nothing but S = 20 with Witten-Bell", CANNOT_TELL),
+        ({"orders": [1, 2]}, "O6", "the grid has no two orders above 1", CANNOT_TELL),
+        ({"orders": [2]}, "O7", "the grid has one order only", NOT_TRIED),
+        ({"smoothings": ["witten-bell"]}, "O8", "the grid has no smoothing lidstone-backoff or lidstone", NOT_TRIED),
+        ({"orders": [2, 3]}, "O9", "the grid has no order 1", NOT_TRIED),
+        ({"orders": [1, 2]}, "O10", "the grid has no order for it", NOT_TRIED),
+        ({"sequences": 5}, "O11", "5 test sequences; a verdict needs 6 or more", CANNOT_TELL),
     ],
 )
-def test_what_the_grid_lacks_is_told(lacking: dict[str, Sequence[int]], name: str, reason: str) -> None:
+def test_what_the_grid_lacks_is_told(lacking: dict[str, Sequence[int]], name: str, reason: str, verdict: str) -> None:
     claims = {claim.name: claim for claim in judge(grid(as_the_paper_says, **lacking), "fixed")}  # type: ignore[arg-type]
-    assert claims[name].verdict == CANNOT_TELL
+    assert claims[name].verdict == verdict
+    assert all((one.verdict == NOT_TRIED) == (one.values is None) for one in claims[name].statements)
     assert any(reason in statement.reason for statement in claims[name].statements)
 
 

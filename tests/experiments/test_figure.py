@@ -22,7 +22,7 @@ def test_a_seed_is_one_number_over_all_folds() -> None:
 
 
 @pytest.mark.parametrize("narrow", [False, True])
-def test_bars_and_lines_are_where_the_numbers_are(tmp_path: Path, narrow: bool) -> None:
+def test_dots_and_lines_are_where_the_numbers_are(tmp_path: Path, narrow: bool) -> None:
     text = CONFIG.replace(', "lidstone-backoff"', "").replace('"none", "compress:3", "unique"', '"none"')
     plan = read_config(write_grid(tmp_path, text))
     rows = [row(seed, "a", 60 + 10 * order + 4 * seed, order) for seed in (0, 1) for order in (1, 3)]
@@ -31,5 +31,5 @@ def test_bars_and_lines_are_where_the_numbers_are(tmp_path: Path, narrow: bool) 
             draw_figure(rows, plan, tmp_path / f"{name}{suffix}", title="Two seeds", narrow=narrow)
         assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
     drawn = (tmp_path / "one.svg").read_text(encoding="utf-8")
-    for text in ("Two seeds", "S = 4, witten-bell", "n = 1", "n = 3", "(axis from 20)", "naive Bayes"):
+    for text in ("Two seeds", "S = 4, witten-bell", "n = 1", "n = 3", "selection of words (dots)", "naive Bayes"):
         assert f"<!-- {text}" in drawn or text in drawn

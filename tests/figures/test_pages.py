@@ -120,3 +120,9 @@ def test_a_table_may_have_no_rows_but_no_ragged_ones() -> None:
 
 def test_the_same_parts_give_the_same_page() -> None:
     assert whole() == whole()
+
+
+def test_what_a_cell_says_can_have_a_mark() -> None:
+    made = table(["claim", "verdict"], [["O1", "holds"], ["O2", "<b>"]], "All", marks={"holds": "yes", "<b>": "no"})
+    assert '<td>O1</td><td class="yes">holds</td>' in made
+    assert '<td class="no">&lt;b&gt;</td>' in made

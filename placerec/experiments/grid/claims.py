@@ -13,7 +13,7 @@ from placerec.arrays import Floats
 from placerec.evaluation.bootstrap import LEAST, middle
 from placerec.experiments.grid.results import MissingCellsError, Results, Scores, mean, scores
 
-HOLDS, FAILS, CANNOT_TELL = "holds", "does not hold", "cannot tell"
+HOLDS, FAILS, CANNOT_TELL, NOT_TRIED = "holds", "does not hold", "cannot tell", "not in the grid"
 # Points: what counts as several percent, as no more than a little, and as among the best.
 SEVERAL, LITTLE, AMONG = 2.0, 2.0, 1.0
 HIGH = 80.0
@@ -46,7 +46,9 @@ class Statement:
 
     @property
     def verdict(self) -> str:
-        """HOLDS, FAILS or CANNOT_TELL."""
+        """HOLDS, FAILS, CANNOT_TELL or NOT_TRIED."""
+        if self.values is None:
+            return NOT_TRIED
         if self.reason or self.interval is None:
             return CANNOT_TELL
         (low, high), t = self.interval, self.threshold
@@ -72,9 +74,11 @@ class Claim:
 
     @property
     def verdict(self) -> str:
-        """HOLDS if all statements hold, FAILS if one does not."""
-        verdicts = [statement.verdict for statement in self.statements]
-        return FAILS if FAILS in verdicts else CANNOT_TELL if CANNOT_TELL in verdicts else HOLDS
+        """HOLDS if all statements hold, FAILS if one does not, NOT_TRIED if the grid has the cells of none."""
+        verdicts = {statement.verdict for statement in self.statements}
+        if len(verdicts) == 1:
+            return verdicts.pop()
+        return FAILS if FAILS in verdicts else CANNOT_TELL
 
 
 def judge(results: Results, transition: str) -> list[Claim]:

@@ -1,6 +1,6 @@
 """The pictures of an experiment: the paper's figure, beliefs of two sequences, a confusion matrix.
 
-The paper's figure is a panel per map size and smoothing, with bars of accuracy by n for each selection.
+The paper's figure is a panel per map size and smoothing, with a dot of accuracy by n for each selection.
 """
 
 import math
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 # Inches.
 _PANEL_WIDTH, _PANEL_HEIGHT = 6.4, 3.1
+_MARKERS = "osD^v<>"
 _BASELINES = (
     ("majority", "always the most frequent place", ":"),
     ("frame_wise", "each frame alone (naive Bayes)", "--"),
@@ -31,7 +32,7 @@ _BASELINES = (
 
 
 def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, narrow: bool = False) -> None:
-    """Draw the rows of one kind of transition: bars are means over seeds, the lines on them one standard deviation.
+    """Draw the rows of one kind of transition: dots are means over seeds, the lines on them one standard deviation.
 
     Sizes are rows and smoothings columns of panels; `narrow`: all in one column. PNG or SVG by suffix;
     MissingExtraError without matplotlib.
@@ -42,41 +43,51 @@ def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, na
     accuracy = by_seed(rows)
     baselines = {kind: by_seed(rows, attrgetter(kind)) for kind, _, _ in _BASELINES}
     values = [np.mean(seeds) for table in (accuracy, *baselines.values()) for seeds in table.values()]
-    lowest = max(0, 10 * math.floor(10 * min(values)) - 10)
+    lowest = max(0.0, 10 * math.floor(10 * min(values)) - 2)
     width = 4.6 if narrow else _PANEL_WIDTH * columns
-    with figure_file(path, width, _PANEL_HEIGHT * lines + (1.6 if narrow else 1.0), "constrained") as figure:
+    with figure_file(path, width, _PANEL_HEIGHT * lines + (1.9 if narrow else 1.3), "constrained") as figure:
         grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
         for axes, (size, smoothing) in zip(grid.ravel(), panels, strict=True):
             own = [row for row in rows if (row.size, row.smoothing) == (size, smoothing)]
-            _bars(axes, own, plan, accuracy)
             settings = sorted({row.setting for row in own})
             for kind, label, style in _BASELINES:
                 level = 100 * float(np.mean([np.mean(baselines[kind][setting]) for setting in settings]))
-                axes.axhline(level, linestyle=style, color="black", linewidth=1.1, label=label)
+                axes.axhline(level, linestyle=style, color="0.25", linewidth=1.1, label=label, zorder=1)
+            _dots(axes, own, plan, accuracy)
             axes.set_title(f"S = {size}, {smoothing}", loc="left", fontsize=10)
-            axes.set_ylim(lowest, 100)
+            axes.set_ylim(lowest, 100.5)
         for axes in grid[:, 0]:
-            axes.set_ylabel("frames right, %" + (f" (axis from {lowest})" if lowest else ""), fontsize=8.5)
+            axes.set_ylabel("frames right, %", fontsize=8.5)
         handles, labels = grid[0][0].get_legend_handles_labels()
-        across = 2 if narrow else min(4, len(labels))
-        figure.legend(handles, labels, loc="outside lower center", ncols=across, frameon=False, fontsize=8.5)
+        figure.legend(
+            # Columns are filled from above: the lines come first, and the selections in their order after them.
+            handles,
+            labels,
+            loc="outside lower center",
+            ncols=2 if narrow else min(4, math.ceil(len(labels) / 2)),
+            frameon=False,
+            fontsize=8.5,
+            title="selection of words (dots), and levels to compare with (lines)",
+            title_fontsize=8.5,
+        )
         figure.suptitle(title, fontsize=11)
 
 
-def _bars(axes: "Axes", rows: Sequence[Row], plan: Config, accuracy: Mapping[Setting, Sequence[float]]) -> None:
+def _dots(axes: "Axes", rows: Sequence[Row], plan: Config, accuracy: Mapping[Setting, Sequence[float]]) -> None:
     size, smoothing, transition = rows[0].size, rows[0].smoothing, rows[0].transition
     selects, orders = plan.select, sorted(plan.order)
-    wide = 0.85 / len(selects)
-    colours = place_colours(selects)
     for number, select in enumerate(selects):
         seeds = [np.array(accuracy[Setting(size, smoothing, select, order, transition)]) * 100 for order in orders]
-        left = np.arange(len(orders)) + wide * (number - (len(selects) - 1) / 2)
-        heights, errors = [one.mean() for one in seeds], [one.std(ddof=1) if len(one) > 1 else 0 for one in seeds]
-        error: Any = {"elinewidth": 0.8, "capsize": 1.5, "ecolor": "0.2"}
-        paint: Any = {"color": tuple(colours[number]), "edgecolor": "0.3", "linewidth": 0.4}
-        axes.bar(left, heights, wide, yerr=errors, error_kw=error, label=select, **paint)
+        # Beside each other, so that no interval hides another.
+        at = np.arange(len(orders)) + 0.4 / len(selects) * (number - (len(selects) - 1) / 2)
+        means, errors = [one.mean() for one in seeds], [one.std(ddof=1) if len(one) > 1 else 0 for one in seeds]
+        colour = tuple(place_colours(selects)[number].tolist())
+        paint: Any = {"color": colour, "marker": _MARKERS[number % len(_MARKERS)], "markersize": 5.5, "label": select}
+        axes.errorbar(at, means, yerr=errors, linewidth=0.6, alpha=0.95, elinewidth=1.3, capsize=2, zorder=3, **paint)
     axes.set_xticks(range(len(orders)), labels=[f"n = {order}" for order in orders], fontsize=8.5)
     axes.tick_params(axis="y", labelsize=8)
+    axes.grid(True, axis="y", color="0.9", linewidth=0.7)
+    axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
 
 

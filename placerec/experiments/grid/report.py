@@ -14,12 +14,12 @@ from placerec.errors import ExperimentError
 from placerec.evaluation.bootstrap import DRAWS, LEAST
 from placerec.evaluation.metrics import evaluate
 from placerec.experiments.grid.cells import GridCell, GridJob, believe_cell
-from placerec.experiments.grid.claims import HIGH, Claim, Statement, judge
+from placerec.experiments.grid.claims import CANNOT_TELL, FAILS, HIGH, HOLDS, NOT_TRIED, Claim, Statement, judge
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
 from placerec.experiments.grid.results import Results, Row, Setting, by_seed
 from placerec.experiments.store import key_of, load, save
-from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
+from placerec.figures.pages import Mark, heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
 from placerec.hohmm import Beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
@@ -30,6 +30,7 @@ from placerec.vision import Descriptors, Dictionary
 PAPER_RUNS = {10: "3.15", 20: "2.67"}
 _CAPTION = "Mean over seeds, with one standard deviation. Dotted: always the most frequent place. Dashed: naive Bayes."
 _PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib")
+_MARKS: Mapping[str, Mark] = {HOLDS: "yes", FAILS: "no", CANNOT_TELL: "open", NOT_TRIED: "none"}
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
 
@@ -108,7 +109,8 @@ def reading(sequences: int, seeds: int) -> str:
         f"draws of the {sequences} test sequences with replacement, the same draws on both sides of a difference; it "
         "does not cover what other training sequences would change. A number holds if its whole interval is where it "
         "is wanted, does not hold if the whole interval is elsewhere, and otherwise cannot be told. A claim holds if "
-        f"all its numbers hold. Fewer than {LEAST} test sequences tell nothing: by chance all may be on one side. A "
+        f"all its numbers hold, and is not in the grid if none of them can be computed from it. Fewer than {LEAST} test "
+        "sequences tell nothing: by chance all may be on one side. A "
         "best or worst cell is chosen on all sequences, so its number flatters. What several percent (2), little (2), "
         f"among the best (1) and high ({HIGH:g} %) mean was set by placerec, not by the paper."
     )
@@ -180,9 +182,9 @@ def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob]
         *_figures(results, plan, out),
         table(*best_table(results), "The ten best of the grid, with what is right without any filter."),
         heading("The paper's claims"),
-        table(*verdicts_table(claims), "Verdicts; the numbers are below."),
+        table(*verdicts_table(claims), "Verdicts; the numbers are below.", marks=_MARKS),
         paragraph(note),
-        *(table(*claims_table(claims[name]), f"With {name} transitions.") for name in claims),
+        *(table(*claims_table(claims[name]), f"With {name} transitions.", marks=_MARKS) for name in claims),
         heading("The data"),
         table(*images_table(results.folds), "Labelled images per place and split."),
         table(*runs_table(results.rows), "Frames in a row with the same word, in training."),
@@ -210,7 +212,7 @@ def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
         with tempfile.TemporaryDirectory() as folder:
             narrow = Path(folder) / "narrow.png"
             draw_figure(rows, plan, narrow, title=title, narrow=True)
-            yield picture(path.with_suffix(".png"), f"Bars of accuracy by n, {title}", _CAPTION, narrow=narrow)
+            yield picture(path.with_suffix(".png"), f"Accuracy by n, {title}", _CAPTION, narrow=narrow)
 
 
 def _what(results: Results, plan: Config, config: Path) -> str:
