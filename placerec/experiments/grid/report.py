@@ -109,8 +109,8 @@ def reading(sequences: int, seeds: int) -> str:
         f"draws of the {sequences} test sequences with replacement, the same draws on both sides of a difference; it "
         "does not cover what other training sequences would change. A number holds if its whole interval is where it "
         "is wanted, does not hold if the whole interval is elsewhere, and otherwise cannot be told. A claim holds if "
-        f"all its numbers hold, and is not in the grid if none of them can be computed from it. Fewer than {LEAST} test "
-        "sequences tell nothing: by chance all may be on one side. A "
+        f"all its numbers hold, and is not in the grid if none of them can be computed from it. Fewer than {LEAST} "
+        "test sequences tell nothing: by chance all may be on one side. A "
         "best or worst cell is chosen on all sequences, so its number flatters. What several percent (2), little (2), "
         f"among the best (1) and high ({HIGH:g} %) mean was set by placerec, not by the paper."
     )
