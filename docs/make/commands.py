@@ -11,7 +11,8 @@ from collections.abc import Iterator
 import click
 
 import placerec
-from placerec.cli import commands
+from placerec.cli import GROUPS, commands
+from placerec.cli.shared.groups import grouped
 from placerec.cli.srilm import EXAMPLES, SRILM_COMMANDS, Tool
 
 HEAD = """\
@@ -34,12 +35,6 @@ SRILM_HEAD = """\
 | command | what it does | example |
 | --- | --- | --- |
 """
-GROUPS = {
-    "From images to words": ("describe", "train-words", "tokenize", "show-words", "show-frame", "stability"),
-    "From words to models": ("train-lm", "update", "inspect", "check", "adapt-lm"),
-    "From words to beliefs": ("decode", "evaluate", "calibrate"),
-    "Experiments": ("compare", "experiment", "lab", "demo"),
-}
 # The one call of the library that a command makes, where it has another name or there are two.
 PYTHON = {
     "check": "check_model",
@@ -56,10 +51,8 @@ COMMON = {"quiet", "verbose", "help"}
 
 def page() -> str:
     """The page."""
-    left = set(commands.commands) - {tool.name for tool in SRILM_COMMANDS} - set().union(*GROUPS.values())
-    groups = GROUPS | ({"More": tuple(sorted(left))} if left else {})
     parts = [HEAD]
-    for title, names in groups.items():
+    for title, names in GROUPS.items():
         parts += [f"## {title}\n", *(section(name, commands.commands[name]) for name in names)]
     return "\n".join([*parts, SRILM_HEAD]) + "".join(map(tool_row, SRILM_COMMANDS))
 
@@ -67,7 +60,10 @@ def page() -> str:
 def section(name: str, command: click.Command) -> str:
     """A command: usage, what it does, its options, an example, the call that does the same."""
     usage = " ".join(" ".join(command.collect_usage_pieces(click.Context(command))).split())
-    rows = [row(each) for each in command.params if isinstance(each, click.Option) and each.name not in COMMON]
+    rows: list[str] = []
+    for title, options in grouped(command.params).items():
+        own = [row(each) for each in options if each.name not in COMMON]
+        rows += [f"| **{title}** | | |", *own] if own and rows else own
     examples = re.sub(r"^(Example: |\s+)", "    ", (command.epilog or "").replace("\b\n", ""), flags=re.MULTILINE)
     calls = PYTHON.get(name, name.replace("-", "_")).split()
     parts = [f"### {name}\n", f"    placerec {name} {usage}\n", *prose(command.help or "")]
@@ -144,7 +140,7 @@ def tool_row(tool: Tool) -> str:
     """A line about a command of SRILM's."""
     name = str(tool.name)
     anchor = name if name in TABLED else "the-scripts"
-    purpose = str(tool.short_help).removeprefix("SRILM's tool: ").rstrip(".")
+    purpose = str(tool.short_help).rstrip(".")
     return f"| [`{name}`](srilm.md#{anchor}) | {purpose} | `placerec {name} {EXAMPLES[name]}` |\n"
 
 

@@ -34,6 +34,16 @@ class Failure(click.ClickException):
         click.echo(f"placerec: {line}", file=file, err=True)
 
 
+# Commands by what people do; those of SRILM follow.
+GROUPS = {
+    "Your images": (
+        *("learn", "describe", "train-words", "tokenize", "train-lm"),
+        *("decode", "evaluate", "calibrate", "update"),
+    ),
+    "Look": ("show-words", "show-frame", "stability", "inspect"),
+    "Language models": ("check", "adapt-lm"),
+    "Experiments": ("demo", "lab", "compare", "experiment"),
+}
 # Columns for the names of commands in the list of them.
 _NAMES = 17
 
@@ -61,13 +71,11 @@ class Commands(click.Group):
             raise Failure(f"not enough memory ({error}); give less at a time") from error
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """All commands, a line each; the few with long names have their line for themselves."""
-        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        with formatter.section("Commands"):
-            width = formatter.width
-            formatter.write_dl(
-                [(name, command.get_short_help_str(width)) for name, command in commands if command], col_max=_NAMES
-            )
+        """All commands, a line each, by what they are for; the few with long names have their line for themselves."""
+        for title, names in (GROUPS | {"SRILM's tools": tuple(str(tool.name) for tool in SRILM_COMMANDS)}).items():
+            with formatter.section(title):
+                lines = [(name, self.commands[name].get_short_help_str(formatter.width)) for name in names]
+                formatter.write_dl(lines, col_max=_NAMES)
 
 
 @click.group(

@@ -8,7 +8,7 @@ import click
 from placerec.cli import shared
 
 
-@click.command(epilog="Example: placerec compare RUNS/ --test RUNS/run3 --test RUNS/run7 -o out/")
+@shared.command(epilog="Example: placerec compare RUNS/ --test RUNS/run3 --test RUNS/run7 -o out/")
 @click.argument("train", metavar="TRAIN...", nargs=-1, required=True, type=shared.PATH)
 @click.option(
     "--test",
@@ -48,7 +48,7 @@ def compare(train: tuple[Path, ...], tests: tuple[Path, ...], methods: str | Non
     click.echo(format_comparison(found))
 
 
-@click.command(epilog="Example: placerec experiment grid.toml -o results/")
+@shared.command(epilog="Example: placerec experiment grid.toml -o results/")
 @click.argument("config", metavar="CONFIG.toml", type=shared.FILE)
 @shared.output_option("results/", "The folder to write; what it holds from before is used again.")
 @shared.jobs_option
@@ -78,7 +78,7 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
     shared.log.info("%s: %d rows; now open %s", out / "results.csv", len(results.rows), out / "report.html")
 
 
-@click.command(epilog="Example: placerec lab LAB/ --scale tiny --seed 1")
+@shared.command(epilog="Example: placerec lab LAB/ --scale tiny --seed 1")
 @click.argument("out", metavar="OUT/", type=shared.PATH)
 @click.option(
     "--scale",
@@ -100,7 +100,7 @@ def lab(out: Path, scale: str, seed: int) -> None:
     shared.log.info("%s: 18 sequences, %d synthetic frames", out, frames)
 
 
-@click.command(epilog="Example: placerec demo")
+@shared.command(epilog="Example: placerec demo")
 @shared.output_option("demo/", "The folder to write.  [default: demo/]", required=False)
 @shared.seed_option("Seed of the laboratory and the maps.")
 @click.option("--as-in-paper", is_flag=True, help="Show the paper's systems alone.")

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from placerec.vision import DictionarySetOptions
 
 
-@click.command(epilog="Example: placerec describe COLD/seq1_cloudy1 -o descriptors.npz")
+@shared.command(epilog="Example: placerec describe COLD/seq1_cloudy1 -o descriptors.npz")
 @shared.source_arguments
 @shared.descriptor_options
 @shared.output_option("descriptors.npz", "The file to write: arrays descriptors, frames, sequences, places, times.")
@@ -30,13 +30,16 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
         describe_sources(sources, out, progress=progress, **how)
 
 
-@click.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
+@shared.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
 @shared.source_arguments
 @shared.dictionary_options
 @shared.as_in_paper(
-    "The paper's words: --views plain --size 10; options given beside it win.", views="plain", sizes="10"
+    shared.groups.word,
+    "The paper's words: --views plain --size 10; options given beside it win.",
+    views="plain",
+    sizes="10",
 )
-@click.option(
+@shared.groups.word(
     "--held-out",
     metavar="SOURCE",
     multiple=True,
@@ -60,7 +63,7 @@ def train_words(sources: tuple[Path, ...], out: Path, words: "DictionarySetOptio
         train_dictionary(sources, out, options=words, progress=progress, **how)
 
 
-@click.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")
+@shared.command(epilog="Example: placerec tokenize RUNS/ -w words.npz -o tokens/")
 @shared.source_arguments
 @shared.words_option(True, "The dictionary of train-words.")
 @shared.matrix_option
@@ -81,7 +84,7 @@ def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> N
         run(sources, words, out, progress=progress, **how)
 
 
-@click.command("show-words", epilog="Example: placerec show-words words.npz RUNS/ -o words.png")
+@shared.command("show-words", epilog="Example: placerec show-words words.npz RUNS/ -o words.png")
 @click.argument("words", metavar="words.npz", type=shared.FILE)
 @shared.source_arguments
 @shared.dictionary_option
@@ -104,7 +107,7 @@ def show_words(words: Path, sources: tuple[Path, ...], out: Path | None, as_json
     shared.echo_json(table.to_json()) if as_json else click.echo(format_words(table))
 
 
-@click.command("show-frame", epilog="Example: placerec show-frame frame.png -w words.npz -o seen.png")
+@shared.command("show-frame", epilog="Example: placerec show-frame frame.png -w words.npz -o seen.png")
 @click.argument("image", metavar="IMAGE", type=shared.FILE)
 @click.argument("sources", metavar="[SOURCE...]", nargs=-1, type=shared.PATH)
 @shared.reading_options()
@@ -129,7 +132,7 @@ def show_frame(
     shared.echo_json(view.to_json()) if as_json else click.echo(format_frame(view))
 
 
-@click.command(epilog="Example: placerec stability RUNS/ -w words.npz -o stability.png")
+@shared.command(epilog="Example: placerec stability RUNS/ -w words.npz -o stability.png")
 @shared.source_arguments
 @shared.words_option(True, "The dictionary of train-words.")
 @shared.dictionary_option

@@ -8,7 +8,7 @@ import click
 from placerec.cli import shared
 
 
-@click.command("learn", epilog="Example: placerec learn RUNS/ -o model/ --test RUNS/run3")
+@shared.command("learn", epilog="Example: placerec learn RUNS/ -o model/ --test RUNS/run3")
 @shared.source_arguments
 @click.option(
     "--test",

@@ -35,17 +35,17 @@ Example: placerec inspect model/kitchen.arpa "w07 w08"
 _model_argument = click.argument("model", metavar="MODEL/", type=shared.PATH)
 
 
-@click.command("train-lm", epilog="Example: placerec train-lm tokens/seq*[12].tsv -o model/ --order 2")
+@shared.command("train-lm", epilog="Example: placerec train-lm tokens/seq*[12].tsv -o model/ --order 2")
 @shared.tokens_argument
 @shared.model_options
-@click.option(
+@shared.groups.model(
     "--vocab",
     "vocabulary",
     metavar="FILE",
     type=shared.PATH,
     help="All words, one a line.  [default: vocab.txt beside TOKENS]",
 )
-@click.option(
+@shared.groups.model(
     "--as-in-paper", is_flag=True, help="Train on the first dictionary alone, and learn nothing of how words weigh."
 )
 @click.option(
@@ -87,7 +87,7 @@ def train_lm(
         run(tokens, out, options=options, as_in_paper=as_in_paper, weigh=weigh, progress=progress, **how)
 
 
-@click.command(epilog="Example: placerec update model/ tokens/today.tsv")
+@shared.command(epilog="Example: placerec update model/ tokens/today.tsv")
 @_model_argument
 @shared.tokens_argument
 @click.option("--forget", is_flag=True, help="Take these sequences away instead; they must have been learned.")
@@ -104,7 +104,7 @@ def update(model: Path, tokens: tuple[Path, ...], forget: bool) -> None:
         run(model, tokens, forget=forget, progress=progress)
 
 
-@click.command(epilog="Example: placerec calibrate model/ tokens/run4.tsv tokens/run5.tsv")
+@shared.command(epilog="Example: placerec calibrate model/ tokens/run4.tsv tokens/run5.tsv")
 @_model_argument
 @shared.tokens_argument
 @shared.decoding_options
@@ -125,7 +125,7 @@ def calibrate(model: Path, tokens: tuple[Path, ...], options: "Decoding") -> Non
     )
 
 
-@click.command(epilog=INSPECT_EXAMPLES)
+@shared.command(epilog=INSPECT_EXAMPLES)
 @click.argument("path", metavar="MODEL.arpa|MODEL/|NAME.explain.jsonl", type=shared.PATH)
 @click.argument("asked", metavar="[NGRAM...|FRAME]", nargs=-1)
 @click.option("--top", type=click.IntRange(min=0), default=5, help="How many n-grams of each order to show.")
@@ -168,7 +168,7 @@ def _decision(path: Path, asked: tuple[str, ...], out: Path | None) -> tuple[obj
     return decision, format_decision(decision)
 
 
-@click.command(epilog="Example: placerec check model/")
+@shared.command(epilog="Example: placerec check model/")
 @click.argument("models", metavar="MODEL.arpa|MODEL/...", nargs=-1, required=True, type=shared.PATH)
 @shared.json_option()
 @shared.talk_options
@@ -194,7 +194,7 @@ def check(models: tuple[Path, ...], as_json: bool) -> None:
         sys.exit(1)
 
 
-@click.command(
+@shared.command(
     "adapt-lm", epilog='Example: placerec adapt-lm kitchen.arpa -o new.arpa --add w99=0.001 --boost "w07 w08"=3'
 )
 @click.argument("model", metavar="MODEL.arpa", type=shared.PATH)
@@ -219,21 +219,23 @@ def adapt_lm(model: Path, out: Path, add: tuple[str, ...], boost: tuple[str, ...
     run(model, out, words, boosts)
 
 
-@click.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
+@shared.command(epilog="Example: placerec decode tokens/run3.tsv -m model/ -o beliefs/")
 @click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=shared.PATH_OR_STREAM)
 @click.option("-m", "--model", metavar="MODEL/", type=shared.PATH, required=True, help="The folder of train-lm.")
 @shared.words_option(False, "The dictionary, if TOKENS are images.  [default: MODEL/words.npz, if it is there]")
 @shared.reading_options(" of images")
 @shared.decoding_options
-@click.option("--viterbi", is_flag=True, help="Write the most probable path as best.")
-@click.option("--calibrated", is_flag=True, help="Apply what `placerec calibrate` found to the beliefs.")
-@click.option("--unknown", is_flag=True, help="Add a column: the probability that the place is none of the model's.")
+@shared.groups.belief("--viterbi", is_flag=True, help="Write the most probable path as best.")
+@shared.groups.belief("--calibrated", is_flag=True, help="Apply what `placerec calibrate` found to the beliefs.")
+@shared.groups.belief(
+    "--unknown", is_flag=True, help="Add a column: the probability that the place is none of the model's."
+)
 @click.option("--explain", is_flag=True, help="Write NAME.explain.jsonl beside the beliefs: what decided each word.")
 @click.option("--live", is_flag=True, help="Answer each frame as it comes: a camera, or a video at its own pace.")
-@click.option(
+@shared.groups.belief(
     "--method", metavar="NAME", default="hohmm", help=f"What turns words into beliefs: hohmm, {', '.join(METHODS)}."
 )
-@click.option(
+@shared.groups.belief(
     "--scorer", type=click.Choice(["native", "kenlm"]), default="native", help="What computes the probabilities."
 )
 @shared.json_option("Write one JSON object per frame instead of tab-separated lines.")
@@ -304,7 +306,7 @@ def _check_answering(what: str, out: Path | None, options: "Decoding") -> None:
         )
 
 
-@click.command(epilog="Example: placerec evaluate beliefs/*.tsv --plot beliefs.png")
+@shared.command(epilog="Example: placerec evaluate beliefs/*.tsv --plot beliefs.png")
 @click.argument("beliefs", metavar="BELIEFS...", nargs=-1, required=True, type=shared.PATH_OR_STREAM)
 @shared.json_option()
 @click.option(

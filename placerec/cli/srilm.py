@@ -11,26 +11,26 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 _PURPOSES = {
-    "ngram-count": "SRILM's tool: count n-grams, estimate models.",
-    "ngram": "SRILM's tool: score text; mix, prune models.",
-    "ngram-merge": "SRILM's tool: add up sorted counts files.",
-    "compute-best-mix": "SRILM's tool: weights for a mixture of models.",
-    "change-lm-vocab": "SRILM's tool: change a model's vocabulary.",
-    "add-ppls": "SRILM's tool: add up ngram -ppl outputs.",
-    "disambig": "SRILM's tool: find hidden words behind words.",
-    "hidden-ngram": "SRILM's tool: find events between words.",
-    "ngram-class": "SRILM's tool: make classes of words.",
-    "replace-words-with-classes": "SRILM's tool: classes for words in text.",
-    "uniform-classes": "SRILM's tool: equal shares within classes.",
-    "subtract-ppls": "SRILM's tool: take ngram -ppl outputs from one.",
-    "sort-lm": "SRILM's tool: sort a model's n-grams.",
-    "make-sub-lm": "SRILM's tool: leave out long n-grams.",
-    "get-unigram-probs": "SRILM's tool: a model's words and their p.",
-    "get-gt-counts": "SRILM's tool: counts of counts.",
-    "make-gt-discounts": "SRILM's tool: Good-Turing parameters.",
-    "make-kn-discounts": "SRILM's tool: Kneser-Ney parameters.",
-    "make-abs-discount": "SRILM's tool: an absolute discount.",
-    "make-big-lm": "SRILM's tool: models of many counts.",
+    "ngram-count": "Count n-grams, estimate models.",
+    "ngram": "Score text; mix, prune models.",
+    "ngram-merge": "Add up sorted counts files.",
+    "compute-best-mix": "Weights for a mixture of models.",
+    "change-lm-vocab": "Change a model's vocabulary.",
+    "add-ppls": "Add up ngram -ppl outputs.",
+    "disambig": "Find hidden words behind words.",
+    "hidden-ngram": "Find events between words.",
+    "ngram-class": "Make classes of words.",
+    "replace-words-with-classes": "Classes for words in text.",
+    "uniform-classes": "Equal shares within classes.",
+    "subtract-ppls": "Take ngram -ppl outputs from one.",
+    "sort-lm": "Sort a model's n-grams.",
+    "make-sub-lm": "Leave out long n-grams.",
+    "get-unigram-probs": "A model's words and their p.",
+    "get-gt-counts": "Counts of counts.",
+    "make-gt-discounts": "Good-Turing parameters.",
+    "make-kn-discounts": "Kneser-Ney parameters.",
+    "make-abs-discount": "An absolute discount.",
+    "make-big-lm": "Models of many counts.",
 }
 
 
@@ -64,9 +64,8 @@ class Tool(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Keep the arguments as they are."""
         if args in (["-h"], ["--help"]):
-            click.echo(
-                f"{_PURPOSES[str(self.name)]}\n\nIts options are SRILM's: docs/srilm.md, or -help, lists them.\n"
-            )
+            click.echo(f"SRILM's tool. {_PURPOSES[str(self.name)]}\n")
+            click.echo("Its options are SRILM's: docs/srilm.md, or -help, lists them.\n")
             click.echo(f"Example: placerec {self.name} {EXAMPLES[str(self.name)]}")
             ctx.exit()
         ctx.args = list(args)

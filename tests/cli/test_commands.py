@@ -52,10 +52,42 @@ def test_every_tool_of_srilm_helps(tool: str) -> None:
 
 
 def test_the_list_of_commands_is_not_cut_off() -> None:
-    text = done("--help").stdout
-    assert "..." not in text.partition("Commands:")[2].partition("Your own images")[0]
+    listed = done("--help").stdout.partition("\nYour images:\n")[2].partition("Your own images")[0]
+    assert "..." not in listed
     for name in commands.commands:
-        assert re.search(rf"^  {name}(\n  )? +[A-Z].*\.$", text, re.MULTILINE), name
+        assert len(re.findall(rf"^  {name}(?:\n  )? +[A-Z].*\.$", listed, re.MULTILINE)) == 1, name
+
+
+def test_commands_are_listed_by_what_people_do() -> None:
+    text = done("--help").stdout
+    groups = dict(re.findall(r"^(\S.*):\n((?:  .*\n)+)", text.partition("placerec learn")[0], re.MULTILINE))
+    assert list(groups)[1:] == ["Your images", "Look", "Language models", "Experiments", "SRILM's tools"]
+    assert re.findall(r"^  (\S+)", groups["Your images"], re.MULTILINE)[:2] == ["learn", "describe"]
+    assert re.findall(r"^  (\S+)", groups["SRILM's tools"], re.MULTILINE) == list(TOOLS)
+
+
+@pytest.mark.parametrize(
+    ("name", "groups"),
+    [
+        ("decode", ["Options", "How sources are read", "How words become beliefs", "General"]),
+        (
+            "train-words",
+            [
+                *("Options", "How sources are read", "How words are learned", "What describes an image"),
+                *("Who does the work", "General"),
+            ],
+        ),
+        ("lab", ["Options", "General"]),
+    ],
+)
+def test_options_are_listed_by_what_they_are_for(name: str, groups: list[str]) -> None:
+    text = done(name, "--help").stdout
+    assert re.findall(r"^(\S.*):$", text, re.MULTILINE) == groups
+    assert re.findall(r"^  (-\S+)", text.partition("\nGeneral:\n")[2], re.MULTILINE) == ["-q,", "-v,", "-h,"]
+    for option in commands.commands[name].params:
+        if isinstance(option, click.Option):
+            shown = re.findall(rf"^  (?:-\S+, )*{option.opts[-1]}\b", text, re.MULTILINE)
+            assert len(shown) == 1, option.opts
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,5 +1,6 @@
 """Options that several commands share: one spelling, one meaning, by subject."""
 
+from placerec.cli.shared import groups as groups
 from placerec.cli.shared.common import (
     as_in_paper as as_in_paper,
     dictionary_option as dictionary_option,
@@ -10,6 +11,7 @@ from placerec.cli.shared.common import (
 )
 from placerec.cli.shared.decoding import decoding_options as decoding_options
 from placerec.cli.shared.descriptors import descriptor_options as descriptor_options, matrix_option as matrix_option
+from placerec.cli.shared.groups import command as command
 from placerec.cli.shared.models import SMOOTHING_NAMES as SMOOTHING_NAMES, model_options as model_options
 from placerec.cli.shared.sources import (
     reading_options as reading_options,

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import click
 
+from placerec.cli.shared.groups import OptionMaker
 from placerec.cli.shared.values import FILE, PATH, Command
 
 
@@ -13,19 +14,19 @@ def size_option(default: int) -> Callable[[Command], Command]:
     return click.option("--size", type=click.IntRange(2, 200), default=default, help=text)
 
 
-def as_in_paper(text: str, **values: str) -> Callable[[Command], Command]:
+def as_in_paper(option: OptionMaker, text: str, **values: str) -> Callable[[Command], Command]:
     """--as-in-paper: other defaults for some options, by the names of their parameters; what is given wins."""
 
     def preset(ctx: click.Context, param: click.Parameter, chosen: bool) -> None:
         if chosen:
             ctx.default_map = {**(ctx.default_map or {}), **values}
 
-    return click.option("--as-in-paper", is_flag=True, is_eager=True, expose_value=False, callback=preset, help=text)
+    return option("--as-in-paper", is_flag=True, is_eager=True, expose_value=False, callback=preset, help=text)
 
 
-def seed_option(text: str) -> Callable[[Command], Command]:
+def seed_option(text: str, option: OptionMaker = click.option) -> Callable[[Command], Command]:
     """--seed: 0 or above, 0 by default."""
-    return click.option("--seed", type=click.IntRange(min=0), default=0, help=text)
+    return option("--seed", type=click.IntRange(min=0), default=0, help=text)
 
 
 def words_option(required: bool, text: str) -> Callable[[Command], Command]:

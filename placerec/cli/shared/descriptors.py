@@ -8,6 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from placerec.cli.shared import groups
 from placerec.cli.shared.values import Command
 
 
@@ -24,7 +25,7 @@ def descriptor_option(text: str, *kinds: str) -> Callable[[Command], Command]:
             raise click.BadParameter(f"{value!r} is not one of {', '.join((*kinds, 'npy:FILE'))}", ctx, param)
         return kind, Path(path)
 
-    return click.option(
+    return groups.descriptor(
         "--descriptor",
         metavar="|".join((*kinds, "npy:FILE")),
         callback=parse,
@@ -40,20 +41,20 @@ def descriptor_options(function: Command) -> Command:
     @descriptor_option(
         "What describes a frame; FILE: a matrix computed elsewhere, one row a frame.", "gist", "centrist"
     )
-    @click.option(
+    @groups.descriptor(
         "--variant",
         type=click.Choice(["lmgist", "classic"]),
         default="lmgist",
         help="Which GIST: LMgist (2011), or that of 2006 and lear_gist.",
     )
-    @click.option(
+    @groups.descriptor(
         "--image-size",
         # Above 1024 the filters alone take gigabytes, and the descriptor has no use for the detail.
         type=click.IntRange(8, 1024),
         default=128,
         help="Side of the square that is described, in pixels.",
     )
-    @click.option(
+    @groups.descriptor(
         "--fit",
         type=click.Choice(["squash", "crop"]),
         default="squash",

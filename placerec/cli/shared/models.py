@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from placerec.cli.shared import groups
 from placerec.cli.shared.values import Command, FiniteRange, usage
 
 # The names of placerec.lm.SMOOTHINGS, written out: --help would wait for numpy.
@@ -18,31 +19,31 @@ SMOOTHING_NAMES = tuple(
 def model_options(function: Command) -> Command:
     """--order, --smoothing and what else language models are made with. The command gets `options`."""
 
-    @click.option("--order", type=click.IntRange(1, 9), default=2, help="n-gram order; 1 is the classical HMM.")
-    @click.option(
+    @groups.model("--order", type=click.IntRange(1, 9), default=2, help="n-gram order; 1 is the classical HMM.")
+    @groups.model(
         "--smoothing",
         type=click.Choice(SMOOTHING_NAMES),
         default="witten-bell",
         help="How unseen n-grams get their probability.",
     )
-    @click.option(
+    @groups.model(
         "--delta",
         type=FiniteRange(0, min_open=True),
         help="What lidstone adds to every count  [default: 1], or absolute takes off it  [default: 0.5].",
     )
-    @click.option(
+    @groups.model(
         "--select",
         default="none",
         metavar="RULE",
         help="Which words count: none (all), unique (one a run), subsample:S (one in S), compress:M (runs by M).",
     )
-    @click.option(
+    @groups.model(
         "--min-count",
         default="1",
         metavar="N[,N...]|srilm",
         help="Per order, how often an n-gram must occur to be listed; srilm is 1,1,2.",
     )
-    @click.option("--markers/--no-markers", default=False, help="Whether to count <s> and </s> around visits.")
+    @groups.model("--markers/--no-markers", default=False, help="Whether to count <s> and </s> around visits.")
     @functools.wraps(function)
     def modelling(
         *args: Any,

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from placerec.cli.shared import groups
 from placerec.cli.shared.values import PATH, PATH_OR_STREAM, Command, FiniteRange, usage
 
 tokens_argument = click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=PATH)
@@ -22,28 +23,28 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
     """--format, --every, --topic, --labels...: how sources are to be read. The command gets `source_options`."""
 
     def decorated(function: Command) -> Command:
-        @click.option(
+        @groups.source(
             "--format",
             "format_",
             type=click.Choice(["auto", "sequences", "places"]),
             default="auto",
             help=f"What a folder of folders{note} is: sequences, or one folder per place.",
         )
-        @click.option(
+        @groups.source(
             "--every", metavar="N", type=click.IntRange(min=1), default=1, help="Read the first of every N frames."
         )
-        @click.option("--topic", metavar="NAME", help="The images of a bag to read, if it has several topics of them.")
-        @click.option(
+        @groups.source("--topic", metavar="NAME", help="The images of a bag to read, if it has several topics of them.")
+        @groups.source(
             "--labels",
             metavar="FILE",
             type=PATH,
             help="Lines 'start end place' in seconds that label a video or a bag; or a folder of NAME.labels.  "
             "[default: NAME.labels beside it]",
         )
-        @click.option(
+        @groups.source(
             "--camera", metavar="NAME", help="The camera to read of a run of several.  [default: colour, or left]"
         )
-        @click.option(
+        @groups.source(
             "--from",
             "begin",
             metavar="S",
@@ -51,20 +52,20 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
             default=0.0,
             help="Read each sequence from this second on, counted from the first frame.",
         )
-        @click.option(
+        @groups.source(
             "--to",
             "end",
             metavar="S",
             type=FiniteRange(min=0, min_open=True),
             help="Read no frame from this second on.",
         )
-        @click.option(
+        @groups.source(
             "--rate",
             metavar="HZ",
             type=FiniteRange(min=0, min_open=True),
             help="Frames a second, where images have no times.",
         )
-        @click.option(
+        @groups.source(
             "--label-clock",
             type=click.Choice(["auto", "stamps", "start"]),
             default="auto",

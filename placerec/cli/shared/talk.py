@@ -12,6 +12,7 @@ from typing import Any
 
 import click
 
+from placerec.cli.shared import groups
 from placerec.cli.shared.values import Command
 
 log = logging.getLogger("placerec")
@@ -28,8 +29,8 @@ class _Talk(logging.Formatter):
 def talk_options(function: Command) -> Command:
     """-q and -v: how much is said on stderr."""
 
-    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more.")
+    @groups.general("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+    @groups.general("-v", "--verbose", is_flag=True, help="Say more.")
     @functools.wraps(function)
     def talking(*args: Any, quiet: bool, verbose: bool, **options: Any) -> Any:
         handler = logging.StreamHandler(sys.stderr)

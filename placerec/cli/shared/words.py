@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from placerec.cli.shared import groups
 from placerec.cli.shared.common import seed_option
 from placerec.cli.shared.values import Command, FiniteRange, listed
 
@@ -12,14 +13,14 @@ from placerec.cli.shared.values import Command, FiniteRange, listed
 def dictionary_options(function: Command) -> Command:
     """--views, --size and what else dictionaries are learned with. The command gets `words`, the options."""
 
-    @click.option(
+    @groups.word(
         "--views",
         metavar="VIEW,...",
         callback=listed(click.Choice(["plain", "pn"])),
         default="plain,pn",
         help="What maps see: principal components (plain), or these by how little the frames of one place differ (pn).",
     )
-    @click.option(
+    @groups.word(
         "--size",
         "--sizes",
         "sizes",
@@ -28,32 +29,32 @@ def dictionary_options(function: Command) -> Command:
         default="10,20",
         help="Sides of the maps: a dictionary of size x size words for each, in every view.",
     )
-    @click.option("--components", type=click.IntRange(min=1), default=80, help="Principal components that a map sees.")
-    @seed_option("Another seed, another map.")
-    @click.option(
+    @groups.word("--components", type=click.IntRange(min=1), default=80, help="Principal components that a map sees.")
+    @seed_option("Another seed, another map.", groups.word)
+    @groups.word(
         "--fraction",
         type=FiniteRange(0, 1, min_open=True),
         default=1.0,
         help="Share of the frames to train on, drawn by the seed.",
     )
-    @click.option(
+    @groups.word(
         "--epochs",
         type=click.IntRange(min=1),
         help="Passes over the frames.  [default: 50, or fewer if the words settle]",
     )
-    @click.option(
+    @groups.word(
         "--units",
         type=click.Choice(["live", "all"]),
         default="live",
         help="Whether units that no training frame hit can be words.",
     )
-    @click.option(
+    @groups.word(
         "--rule",
         type=click.Choice(["batch", "online"]),
         default="batch",
         help="All frames at once, or Kohonen's one after the other (slow, for comparison).",
     )
-    @click.option(
+    @groups.word(
         "--width",
         type=FiniteRange(min=0, min_open=True),
         default=0.5,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from placerec.cli.shared import groups
 from placerec.cli.shared.values import Command, usage
 
 if TYPE_CHECKING:
@@ -21,14 +22,14 @@ def _cluster_address(ctx: click.Context, param: click.Parameter, value: str | No
     return value
 
 
-jobs_option = click.option(
+jobs_option = groups.work(
     "-j",
     "--jobs",
     metavar="N",
     type=click.IntRange(min=1),
     help="Processes that share the work; the output is the same for any number.  [default: one a processor]",
 )
-_CLUSTER = click.option(
+_CLUSTER = groups.work(
     "--cluster",
     metavar="ADDRESS|local:N",
     callback=_cluster_address,
