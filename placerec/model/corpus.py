@@ -20,7 +20,7 @@ from placerec.words.folder import (
     no_streams,
     stream_files,
 )
-from placerec.words.stream import FIRST, column_of, locate
+from placerec.words.stream import FIRST, column_of, locate, read_dictionaries
 
 REMEDY = "add it, or remove the line"
 # Sentences of a text that are in memory at one time.
@@ -110,7 +110,7 @@ def gather_corpus(
 
 def dictionaries_in(sources: Sequence[Path | str]) -> tuple[str, ...]:
     """The names of the dictionaries that token streams have words of, as the first stream tells; of texts the first."""
-    return (FIRST,) if holds_sentences(sources) else next(each_stream(stream_files(sources)[:1])).dictionaries
+    return (FIRST,) if holds_sentences(sources) else read_dictionaries(stream_files(sources)[0])
 
 
 def vocabularies_of(

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from placerec.arrays import Ints
-from placerec.errors import LanguageModelError
+from placerec.errors import LanguageModelError, VisionError
 from placerec.hohmm.evidence import DictionaryModels, evidence_in
 from placerec.hohmm.weights import HeldOut, Weights, choose_weights, shares_of
 from placerec.lm import NgramCounts, count_ngrams
@@ -21,6 +21,7 @@ from placerec.lm.arpa import as_printed
 from placerec.lm.backoff import unite_models
 from placerec.lm.counts import add_counts
 from placerec.model.options import ModelOptions, estimate_place
+from placerec.model.record import Route, labelled_frames, route_table, table_routes
 from placerec.words import Sentences, WordStream, place_steps, sentences_per_place
 
 GROUPS = 5
@@ -37,7 +38,7 @@ class PlaceCounts:
 
     ngrams: Mapping[Key, NgramCounts] = field(repr=False)
     frames: Counter[str]
-    steps: Counter[tuple[str, str]]
+    steps: Counter[Route]
 
     @property
     def places(self) -> list[str]:
@@ -46,8 +47,7 @@ class PlaceCounts:
 
     def step_counts(self) -> Ints:
         """How often a frame at places[i] was followed by one at places[j], int64 (C, C)."""
-        places = self.places
-        return np.array([[self.steps[before, after] for after in places] for before in places], np.int64)
+        return route_table(self.steps, self.places, 2)
 
     def frame_counts(self) -> Ints:
         """The number of labelled frames of each place, int64 (C,)."""
@@ -58,7 +58,7 @@ class PlaceCounts:
         """What all parts tell together; `parts` holds at least one."""
         keys = dict.fromkeys(key for part in parts for key in part.ngrams)
         ngrams = {key: add_counts(*(part.ngrams[key] for part in parts if key in part.ngrams)) for key in keys}
-        frames, steps = Counter[str](), Counter[tuple[str, str]]()
+        frames, steps = Counter[str](), Counter[Route]()
         for part in parts:
             frames.update(part.frames)
             steps.update(part.steps)
@@ -71,7 +71,7 @@ def count_places(
     """What labelled streams tell of the places; `vocabularies`: the words of each dictionary, by its name."""
     ngrams: dict[Key, NgramCounts] = {}
     waiting: dict[Key, Sentences] = {}
-    frames, steps = Counter[str](), Counter[tuple[str, str]]()
+    frames, steps = Counter[str](), Counter[Route]()
     words = 0
 
     def count() -> None:
@@ -84,10 +84,10 @@ def count_places(
         for name in vocabularies:
             for place, text in sentences_per_place([stream.in_dictionary(name)], options.select).items():
                 waiting.setdefault((name, place), []).extend(text)
-        places = sorted({*stream.places} - {""})
-        found = place_steps(stream, places)
-        steps.update({(places[i], places[j]): int(found[i, j]) for i, j in np.argwhere(found).tolist()})
-        frames.update(place for place in stream.places if place)
+        found = labelled_frames(stream)
+        places = sorted(found)
+        steps.update(table_routes(place_steps(stream, places), places))
+        frames.update(found)
         words += len(stream)
         if words > TOGETHER:
             count()
@@ -147,9 +147,9 @@ def learn_weights(
 
 
 def chosen(sequences: Iterable[HeldOut], dictionaries: int) -> Weights:
-    """The weights that are best on held-out sequences, or those without any if their models cannot be estimated."""
+    """The weights that are best on held-out sequences, or those without any if nothing can be learned without some."""
     try:
         return choose_weights(sequences, dictionaries)
-    except LanguageModelError as error:
+    except (LanguageModelError, VisionError) as error:
         log.warning("the weight of words cannot be learned: without some of the sequences, %s", error)
         return choose_weights([], dictionaries)

@@ -23,17 +23,14 @@ from placerec.journal import open_journal
 from placerec.model.evidence import chosen, count_places, group_borders, held_out
 from placerec.model.folder import TOKENS, LearnedEvidence, ModelFolder, owned_by
 from placerec.model.options import ModelOptions
-from placerec.model.train import train_folder
-from placerec.vision import Descriptors, DescriptorSpec, DictionarySet, DictionarySetOptions, describe
+from placerec.model.train import keep_evidence, train_folder
+from placerec.vision import DescriptorSpec, DictionarySet, DictionarySetOptions, describe
 from placerec.vision.chunks import Source
 from placerec.vision.describe import keep_described
 from placerec.vision.external import read_rows
 from placerec.vision.learning import some_rows
-from placerec.words import WordStream
-from placerec.words.folder import each_stream, fill_folder, stream_files
+from placerec.words.folder import dictionary_of, each_stream, fill_folder, stream_files
 from placerec.words.tokenize import streams_of_rows
-
-log = logging.getLogger(__name__)
 
 
 def learn_model(
@@ -96,11 +93,9 @@ def learn_folder(
     tokens = folder.path / TOKENS
     tokens.mkdir()
     fill_folder(streams_of_rows(values, table, made), made, tokens)
-    weigh = partial(learn_weights_anew, values, table, spec, made.options, options, work)
-    evidence = train_folder(folder, [tokens], options, weigh=weigh)
-    if evidence is None:
-        raise ModelError(f"{tokens}: holds nothing to learn the weight of words from")
-    return evidence
+    records = train_folder(folder, [tokens], options)
+    weights = learn_weights_anew(values, table, spec, made.options, options, work)
+    return keep_evidence(folder, records, weights, words=True)
 
 
 def learn_weights_anew(
@@ -133,11 +128,7 @@ def learn_weights_anew(
             streams = streams_of_rows(some_rows(values, left), table.take(left), made)
             yield from held_out(counts, streams, vocabularies, options)
 
-    try:
-        return chosen(held(), dictionaries)
-    except VisionError as error:
-        log.warning("the weight of words cannot be learned: without some of the sequences, %s", error)
-        return chosen([], dictionaries)
+    return chosen(held(), dictionaries)
 
 
 @contextmanager
@@ -158,13 +149,14 @@ def weigher(
     """What learns the weights of token streams as `learn` does, given their words.npz and their descriptors.
 
     `descriptors`: an .npz of `placerec describe` that has a row for every frame. Raises VisionError for a file that
-    cannot be used.
+    cannot be used, and for dictionaries that are known to be others than those that made the tokens.
     """
-    made = DictionarySet.load(words)
-    streams: list[WordStream] = list(each_stream(stream_files(tokens)))
-    table = FrameTable.concat(stream.table for stream in streams)
+    made, files = DictionarySet.load(words), stream_files(tokens)
+    maker = dictionary_of(files)
+    if maker and maker.fingerprint != made.fingerprint:
+        raise VisionError(f"{words}: did not make the words in {maker.folder}; name the words.npz that made them")
+    table = FrameTable.concat(stream.table for stream in each_stream(files))
     values, kept = read_rows(Path(descriptors), list(zip(table.sequences, table.names, strict=True)))
     if len(kept) < len(table):
         raise VisionError(f"{descriptors}: has rows for {len(kept)} of the {len(table)} frames; describe all of them")
-    found = Descriptors(made.spec, values, table)
-    return partial(learn_weights_anew, found.values, table, made.spec, made.options, options)
+    return partial(learn_weights_anew, values, table, made.spec, made.options, options)

@@ -1,7 +1,7 @@
 """What is recorded of the training sequences: integers only, so that adding and taking away is exact."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,13 +28,15 @@ class Record:
 
     `routes`: places -> how often they followed each other, two from frame to frame (`placerec.words.place_steps`),
     three from visit to visit (`place_triples` there). `distances`: per place. Both are None where sentences were
-    learned, not token streams. `dictionary`: the fingerprint, None if unknown.
+    learned, not token streams. `dictionary`: the fingerprint, None if unknown. `frames`: how many are labelled with
+    each place, in alphabetical order; empty unless token streams were read, for model.json has them elsewhere.
     """
 
     sequences: tuple[LearnedSequence, ...] = ()
     dictionary: str | None = None
     routes: Mapping[Route, int] | None = field(default=None, repr=False)
     distances: Mapping[str, Histogram] | None = field(default=None, repr=False)
+    frames: Mapping[str, int] = field(default_factory=dict, repr=False)
 
     @property
     def places(self) -> list[str]:
@@ -49,22 +51,32 @@ class Record:
     @property
     def transitions(self) -> Ints | None:
         """How often a frame at places[i] was followed by one at places[j], int64 (C, C)."""
-        return self._table(2)
+        return None if self.routes is None else route_table(self.routes, self.places, 2)
 
     @property
     def triples(self) -> Ints | None:
         """How often a visit to places[j] came from one to places[i] and led to one to places[k], int64 (C, C, C)."""
-        return self._table(3)
+        return None if self.routes is None else route_table(self.routes, self.places, 3)
 
-    def _table(self, n: int) -> Ints | None:
-        if self.routes is None:
-            return None
-        index = {place: i for i, place in enumerate(self.places)}
-        table = np.zeros((len(index),) * n, np.int64)
-        for route, count in self.routes.items():
-            if len(route) == n:
-                table[tuple(index[place] for place in route)] = count
-        return table
+
+def route_table(routes: Mapping[Route, int], places: Sequence[str], n: int) -> Ints:
+    """The counts of the routes over n places as a table, int64 (C,) * n in the order of `places`."""
+    index = {place: i for i, place in enumerate(places)}
+    table = np.zeros((len(index),) * n, np.int64)
+    for route, count in routes.items():
+        if len(route) == n:
+            table[tuple(index[place] for place in route)] = count
+    return table
+
+
+def table_routes(table: Ints, places: Sequence[str]) -> dict[Route, int]:
+    """The routes that a table of `route_table` counts, those that occur."""
+    return {tuple(places[i] for i in at): int(table[tuple(at)]) for at in np.argwhere(table).tolist()}
+
+
+def labelled_frames(stream: WordStream) -> Counter[str]:
+    """How many frames of a stream are labelled with each place."""
+    return Counter(place for place in stream.table.places if place)
 
 
 class Recorder:
@@ -74,14 +86,15 @@ class Recorder:
         self._learned: list[LearnedSequence] = []
         self._routes: Counter[Route] = Counter()
         self._distances: dict[str, Histogram] = {}
+        self._frames: Counter[str] = Counter()
 
     def add(self, stream: WordStream, sentences: Mapping[str, Sentences]) -> None:
         """Take note of a stream and its sentences per place."""
         places = sorted(sentences)
         self._learned.append(LearnedSequence(stream.name, {place: len(sentences[place]) for place in places}))
         for counts in (place_steps(stream, places), place_triples(stream, places)):
-            for at in np.argwhere(counts).tolist():
-                self._routes[tuple(places[i] for i in at)] += int(counts[tuple(at)])
+            self._routes.update(table_routes(counts, places))
+        self._frames.update(labelled_frames(stream))
         labels = np.array(stream.places, np.str_)
         for place in places:
             histogram = distance_histogram(stream.distances[labels == place])
@@ -89,7 +102,8 @@ class Recorder:
 
     def record(self, dictionary: str | None) -> Record:
         """The record so far, of streams in the words of `dictionary`."""
-        return Record(tuple(self._learned), dictionary, self._routes, dict(sorted(self._distances.items())))
+        distances, frames = dict(sorted(self._distances.items())), dict(sorted(self._frames.items()))
+        return Record(tuple(self._learned), dictionary, self._routes, distances, frames)
 
 
 def record_streams(streams: Iterable[tuple[WordStream, Mapping[str, Sentences]]], dictionary: str | None) -> Record:

@@ -1,7 +1,6 @@
 """From sentences per place to a MODEL/ folder: one ARPA file per place, and all that made it, as text."""
 
 import logging
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -16,11 +15,19 @@ from placerec.lm.counts import count_texts
 from placerec.lm.vocabulary import SENTENCE_END
 from placerec.model.corpus import dictionaries_in, gather_corpus, holds_sentences
 from placerec.model.evidence import learn_weights
-from placerec.model.folder import MODEL_JSON, LearnedEvidence, ModelDescription, ModelFolder, owned_by
+from placerec.model.folder import LearnedEvidence, ModelDescription, ModelFolder, owned_by
 from placerec.model.options import ModelOptions, estimate_place
 from placerec.model.record import Record
-from placerec.words import Sentences, each_sentence, format_sentences, read_stream, write_vocabulary
-from placerec.words.folder import each_stream, stream_files
+from placerec.words import (
+    Sentences,
+    each_sentence,
+    format_sentences,
+    read_stream,
+    read_vocabulary,
+    write_vocabulary,
+)
+from placerec.words.folder import stream_files
+from placerec.words.stream import FIRST
 
 NO_PLACE = "no labelled frame found: label the frames (places.lst, or one folder per place) to train"
 log = logging.getLogger(__name__)
@@ -47,11 +54,13 @@ def train_lm(
     options.check()
     with whole_folder(Path(out), owned_by(Path(out))) as path:
         folder = ModelFolder(path)
-        evidence = train_folder(
-            folder, tokens, options, vocabulary, as_in_paper=as_in_paper, weigh=weigh, work=work, progress=progress
-        )
-        places = ModelDescription.read(path / MODEL_JSON).places
-    log.info("%s: %d places, order %d, %s", out, len(places), options.order, options.smoothing)
+        names = dictionaries_in(tokens)[: 1 if as_in_paper else None]
+        records = train_folder(folder, tokens, options, vocabulary, names, work, progress)
+        evidence = None
+        if not as_in_paper and not holds_sentences(tokens):
+            weights = weigh() if weigh else _weights_of_tokens(folder, tokens, names, options)
+            evidence = keep_evidence(folder, records, weights, words=weigh is not None)
+    log.info("%s: %d places, order %d, %s", out, len(records[FIRST].places), options.order, options.smoothing)
     if evidence is not None:
         log.info("%s", evidence)
 
@@ -61,17 +70,15 @@ def train_folder(
     tokens: Sequence[Path | str],
     options: ModelOptions,
     vocabulary: Path | str | None = None,
-    *,
-    as_in_paper: bool = False,
-    weigh: Callable[[], Weights] | None = None,
+    dictionaries: Sequence[str] | None = None,
     work: Executor | None = None,
     progress: Progress | None = None,
-) -> LearnedEvidence | None:
-    """Write the models and what goes with them into a folder that is there; what was learned of weights, if anything.
+) -> dict[str, Record]:
+    """Write the models and what goes with them into a folder that is there; the record of each dictionary, by name.
 
-    Arguments and errors are those of `train_lm`.
+    `dictionaries`: those whose words are read, all by default. Other arguments and errors are those of `train_lm`.
     """
-    names = dictionaries_in(tokens)[: 1 if as_in_paper else None]
+    names = dictionaries_in(tokens) if dictionaries is None else dictionaries
     folders = {name: folder.of(name) for name in names}
     for own in folders.values():
         (own.path / "sentences").mkdir(parents=True)
@@ -87,17 +94,27 @@ def train_folder(
         texts = (each_sentence(folders[name].place(place).sentences) for place in record.places)
         counts = _counted(texts, words, options, work)
         write_model(folders[name], record.places, record.places, counts, words, options, record, progress)
-    if as_in_paper or holds_sentences(tokens):
-        return None
-    files = stream_files(tokens)
-    if weigh is None:
-        vocabularies = {name: words for name, (words, _) in gathered.items()}
-        weights = learn_weights([partial(read_stream, path) for path in files], vocabularies, options)
-    else:
-        weights = weigh()
-    fingerprints = {name: record.dictionary for name, (_, record) in gathered.items()}
-    frames = Counter(place for stream in each_stream(files) for place in stream.places if place)
-    evidence = LearnedEvidence(weights, len(files), dict(sorted(frames.items())), fingerprints, weigh is not None)
+    return {name: record for name, (_, record) in gathered.items()}
+
+
+def _weights_of_tokens(
+    folder: ModelFolder, tokens: Sequence[Path | str], dictionaries: Sequence[str], options: ModelOptions
+) -> Weights:
+    """The weights of words that token streams alone tell, given the folder of their models."""
+    vocabularies = {name: read_vocabulary(folder.of(name).vocabulary) for name in dictionaries}
+    return learn_weights([partial(read_stream, path) for path in stream_files(tokens)], vocabularies, options)
+
+
+def keep_evidence(
+    folder: ModelFolder, records: Mapping[str, Record], weights: Weights, *, words: bool
+) -> LearnedEvidence:
+    """Write into a folder of models how much words weigh, and what that was learned from, which is returned.
+
+    `records`: those of the models' training, by dictionary. `words`: whether words were redone for it, too.
+    """
+    fingerprints = {name: record.dictionary for name, record in records.items()}
+    first = records[FIRST]
+    evidence = LearnedEvidence(weights, len(first.sequences), first.frames, fingerprints, words)
     folder.describe(evidence=evidence.as_dict())
     return evidence
 

@@ -26,7 +26,7 @@ from placerec.model.options import ModelOptions
 from placerec.model.record import Record, add_record, take_away
 from placerec.model.train import write_model
 from placerec.words import format_sentences, read_vocabulary
-from placerec.words.folder import check_dictionary, each_stream, stream_files
+from placerec.words.folder import check_dictionary, stream_files
 from placerec.words.stream import FIRST, stream_name
 
 # The sentences of a place, as in its file.
@@ -80,7 +80,7 @@ def update(
                 folder.path.mkdir(exist_ok=True)
                 changed = _write_changed(folder, old, new, tokens, forget, progress)
             if evidence is not None:
-                frames = _added_frames(evidence.frames, tokens, forget)
+                frames = _added_frames(evidence.frames, news[0].record.frames, forget)
                 ModelFolder(made).describe(evidence=replace(evidence, frames=frames).as_dict())
             for name in (WORDS, TOKENS):
                 _copy(path / name, made / name)
@@ -123,9 +123,8 @@ def _write_changed(
     return changed
 
 
-def _added_frames(frames: Mapping[str, int], tokens: Sequence[Path | str], forget: bool) -> dict[str, int]:
-    """The labelled frames of each place with those of `tokens` added, or taken away; places that are left with some."""
-    added = Counter(place for stream in each_stream(stream_files(tokens)) for place in stream.places if place)
+def _added_frames(frames: Mapping[str, int], added: Mapping[str, int], forget: bool) -> dict[str, int]:
+    """The labelled frames of each place with others added, or taken away; places that are left with some."""
     total = Counter(frames)
     total.update({place: -count if forget else count for place, count in added.items()})
     return {place: count for place, count in sorted(total.items()) if count > 0}

@@ -22,7 +22,7 @@ import numpy as np
 
 from placerec.arrays import Floats
 from placerec.errors import StreamError, at, refuse_string
-from placerec.files import all_lines, number_in, write_text
+from placerec.files import all_lines, number_in, read_lines, write_text
 from placerec.frames.places import check_place, checked_place
 from placerec.frames.table import FrameTable
 
@@ -127,6 +127,8 @@ class WordStream:
 
     def in_dictionary(self, name: str) -> "WordStream":
         """The stream with the words of one of `dictionaries` alone."""
+        if name == FIRST and not self.further:
+            return self
         column = self if name == FIRST else self.further[name]
         return WordStream(self.name, self.table, column.words, column.distances)
 
@@ -214,11 +216,26 @@ def read_stream(path: Path | str) -> WordStream:
     stream = WordStream.of(
         name, first.words, column.get("place"), frames=column.get("frame"), times=times, distances=first.distances
     )
-    further = [dictionary_in(title) for title in header if title.startswith(WORD)]
+    _, *further = _dictionaries(path, header)
+    return replace(stream, further={dictionary: words_of(f".{dictionary}") for dictionary in further})
+
+
+def read_dictionaries(path: Path | str) -> tuple[str, ...]:
+    """The names of the dictionaries whose words a token stream file has, of which its first line alone is read.
+
+    Raises StreamError for a file that cannot be read and for a name that a dictionary cannot have.
+    """
+    path = Path(path)
+    return _dictionaries(path, next(read_lines(path, StreamError), "").split("\t"))
+
+
+def _dictionaries(path: Path, header: Sequence[str]) -> tuple[str, ...]:
+    # A text of words has no header.
+    further = [dictionary_in(title) for title in header if title.startswith(WORD)] if "word" in header else []
     for dictionary in further:
         if reason := "is taken" if dictionary in TAKEN else check_place(dictionary):
             raise StreamError(at(path, 1, f"the name {dictionary!r} of a dictionary {reason}; rename the column"))
-    return replace(stream, further={dictionary: words_of(f".{dictionary}") for dictionary in further})
+    return FIRST, *further
 
 
 def stream_name(path: Path) -> str:

@@ -1,5 +1,6 @@
 """`placerec learn`: from images to a model in one go, the files of the single commands to the byte."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -88,3 +89,24 @@ def test_descriptors_that_lack_frames_are_refused(tmp_path: Path, runs: list[Pat
     describe_sources(runs[:2], tmp_path / "two.npz")
     with pytest.raises(VisionError, match=r"two\.npz: has no rows for the sequence 'run2'"):
         weigher([tmp_path / "tokens"], tmp_path / "words.npz", tmp_path / "two.npz", ModelOptions())
+
+
+def test_dictionaries_that_did_not_make_the_words_are_refused(tmp_path: Path, runs: list[Path]) -> None:
+    for name, options in (("words", WORDS), ("others", replace(WORDS, seed=1))):
+        train_dictionary(runs[:3], tmp_path / f"{name}.npz", options=options)
+    tokenize(runs[:3], tmp_path / "words.npz", tmp_path / "tokens")
+    describe_sources(runs[:3], tmp_path / "all.npz")
+    with pytest.raises(
+        VisionError, match=r"others\.npz: did not make the words in .*tokens; name the words\.npz that "
+    ):
+        weigher([tmp_path / "tokens"], tmp_path / "others.npz", tmp_path / "all.npz", ModelOptions())
+
+
+def test_where_some_sequences_give_no_dictionary_that_is_said_and_nothing_is_weighed(
+    tmp_path: Path, runs: list[Path], caplog: pytest.LogCaptureFixture
+) -> None:
+    (runs[1] / "localization/places.lst").unlink()
+    words = replace(WORDS, views=("pn",))
+    evidence = learn(runs[:2], tmp_path / "model", words=words).evidence
+    assert (evidence.weights.alpha, evidence.weights.memory, evidence.weights.log_loss) == (1 / 2, 0.0, None)
+    assert "the weight of words cannot be learned: without some of the sequences, the view pn cannot be" in caplog.text

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.several_dictionaries import FURTHER, several_words, write_several
 
-from placerec.errors import LanguageModelError, ModelError, StreamError
+from placerec.errors import LanguageModelError, ModelError, OutputError, StreamError
 from placerec.evaluation.metrics import evaluate
 from placerec.hohmm.weights import ALPHAS, MEMORIES
 from placerec.inspection.decision import format_decision, inspect_decision
@@ -208,7 +208,7 @@ def test_a_model_of_several_is_replaced_whole_and_other_files_are_spared(tmp_pat
     assert not (tmp_path / "model/pn10").exists()
     train_lm(runs[:3], tmp_path / "model")
     (tmp_path / "model/notes.md").write_text("mine")
-    with pytest.raises(Exception, match=r"notes\.md"):
+    with pytest.raises(OutputError, match=r"notes\.md"):
         train_lm(runs[:3], tmp_path / "model")
 
 

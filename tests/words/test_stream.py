@@ -19,7 +19,7 @@ from placerec.words import (
     write_stream,
     write_vocabulary,
 )
-from placerec.words.stream import RESERVED
+from placerec.words.stream import RESERVED, read_dictionaries
 
 names = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=5).filter(
     lambda name: (
@@ -151,3 +151,25 @@ def test_parts_of_a_stream_are_joined_in_order() -> None:
     first, second = WordStream.of("run", ["a"], ["hall"], times=[1]), WordStream.of("run", ["b"], [""], times=[2])
     whole = WordStream.concat([first, second])
     assert (whole.name, whole.words, whole.places, whole.times.tolist()) == ("run", ("a", "b"), ("hall", ""), [1, 2])
+
+
+@pytest.mark.parametrize(
+    ("header", "names"),
+    [
+        ("frame\tword\tdistance", ("",)),
+        ("word.pn10\tword\tword.plain20", ("", "pn10", "plain20")),
+        ("word.pn10 is a word of a text", ("",)),
+    ],
+)
+def test_the_first_line_alone_tells_the_dictionaries(tmp_path: Path, header: str, names: tuple[str, ...]) -> None:
+    (tmp_path / "run.tsv").write_bytes(header.encode() + b"\n\xff is no UTF-8\n")
+    assert read_dictionaries(tmp_path / "run.tsv") == names
+
+
+def test_a_dictionary_cannot_be_called_as_a_folder_of_models_is(tmp_path: Path) -> None:
+    (tmp_path / "run.tsv").write_text("word\tword.counts\nw1\tw2\n")
+    for read in (read_dictionaries, read_stream):
+        with pytest.raises(
+            StreamError, match=r"run\.tsv:1: the name 'counts' of a dictionary is taken; rename the col"
+        ):
+            read(tmp_path / "run.tsv")
