@@ -38,6 +38,9 @@ _BRIGHT = (0x56B4E9, 0xE69F00, 0x009E73, 0xCC79A7, 0x332288, 0xF0E442)
 _PALETTE = (*_BRIGHT, 0xD55E00, 0x0072B2, 0x999933, 0x882255, 0xDDCC77, 0x999999)
 WHITE, BLACK, _GREY = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.78, 0.78, 0.78)
 
+# The width of a letter of DejaVu Sans, in units of the font's size, on the safe side.
+LETTER = 0.66
+
 # Inches that are left free at the edges of a sheet.
 MARGIN = 0.3
 
@@ -111,6 +114,11 @@ def panel(figure: "Figure", left: float, top: float, wide: float, high: float) -
     """New axes of this size in inches, so many inches from the left and from the top of a figure."""
     width, height = figure.get_size_inches()
     return figure.add_axes((left / width, 1 - (top + high) / height, wide / width, high / height))
+
+
+def inches(axes: "Axes") -> float:
+    """How wide axes are."""
+    return float(axes.bbox.width / axes.figure.dpi)
 
 
 def write_line(figure: "Figure", top: float, text: str, size: float, colour: str = "black") -> None:

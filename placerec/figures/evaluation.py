@@ -9,25 +9,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from placerec.arrays import Floats, Ints
 from placerec.errors import EvaluationError
 from placerec.evaluation.confidence import COVERAGES, ECE_BINS, NewPlaces, Reliability, RiskCoverage
-from placerec.evaluation.metrics import Evaluation, evaluate, right_frames
+from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.evaluation.summary import percent, shorten
 from placerec.figures.canvas import (
     BLACK,
+    LETTER,
     MARGIN,
     WHITE,
     check_figure,
     figure_file,
-    letter_colour,
+    inches,
     panel,
     place_colours,
     write_line,
 )
+from placerec.figures.strip import axis_of, belief_strip
 from placerec.frames.doubts import warn_of_still_sequences, warn_of_strange_labels
 from placerec.frames.naming import unique_names
-from placerec.frames.table import Labels
 from placerec.hohmm.beliefs import UNKNOWN_PLACE, Beliefs, parse_beliefs, read_beliefs
 from placerec.words.folder import is_stream
 
@@ -41,57 +41,11 @@ MOST_STRIPS = 20
 _WIDTH, _HEAD = 14.0, 1.15
 _STRIP_LEFT, _STRIP_WIDTH = 0.75, 7.6
 _SIDE_LEFT, _MATRIX_LEFT = 8.75, 10.3
-_CURVES_LEFT, _CURVE, _CURVE_STEP, _CURVES_HEIGHT = 9.1, 1.95, 2.55, 2.9
-
-# More columns than this would fall between the pixels of a strip.
-_MOST_COLUMNS = 1500
-_BELIEF_ROWS = 120
-
-# Where the bars of a strip lie, in units of the belief's height.
-_TRUE, _DECIDED, _WRONG = (1.07, 1.43), (-0.33, -0.07), (-0.55, -0.41)
-
-# The width of a letter of DejaVu Sans, in units of the font's size, on the safe side.
-_LETTER = 0.66
+_CURVES_LEFT, _CURVE, _CURVE_STEP, _CURVES_HEIGHT = 9.1, 1.95, 2.55, 3.5
+# The bars of how many frames a bin of the reliability has, and what is free above them.
+_BINS, _BINS_GAP = 0.5, 0.12
 
 _BLUE, _GREY = "#4a90c2", "0.55"
-
-
-def belief_strip(axes: "Axes", beliefs: Beliefs, evaluation: Evaluation) -> None:
-    """Draw one sequence: true places on top, the beliefs stacked to 1, decided places below, black where wrong.
-
-    With a column `unknown` its share comes on top of the places', which are drawn as much lower. Of a long sequence
-    evenly spaced frames are drawn. `evaluation`: of all sequences of the picture, which give the places their colours.
-    """
-    places, accuracy = evaluation.places, evaluation.sequences[beliefs.name].accuracy
-    right = "no frame has a label" if accuracy is None else f"{percent(accuracy)} right"
-    frames = len(beliefs.frames)
-    # One more colour than places: the last answers for index -1, no label.
-    colours = np.vstack([place_colours(places), WHITE])
-    axes.set(xlim=(0, max(frames, 1)), ylim=(_WRONG[0] - 0.05, _TRUE[1]), facecolor="none")
-    axes.spines[:].set_visible(False)
-    heights = [sum(span) / 2 for span in (_TRUE, (0, 1), _DECIDED, _WRONG)]
-    axes.set_yticks(heights, labels=["true", "belief", "decided", "wrong"], fontsize=6.5)
-    axes.tick_params(axis="x", labelsize=6.5, length=2, pad=1.5)
-    axes.tick_params(axis="y", length=0, pad=2)
-    axes.set_title(f"{shorten(beliefs.name, 70)}   {right}", loc="left", fontsize=8.5, pad=3)
-    if not frames:
-        axes.text(0.5, 0.5, "no frames", ha="center", va="center", fontsize=8, color="0.4")
-        return
-    truth, decided = beliefs.stream.table.places.codes(places), Labels(beliefs.best).codes(places)
-    drawn = np.unique(np.linspace(0, frames - 1, min(frames, _MOST_COLUMNS)).round().astype(np.int64))
-    if len(drawn) < frames:
-        axes.set_title(f"{len(drawn)} of {frames} frames are drawn", loc="right", fontsize=6.5, color="0.4", pad=3)
-    wrong = (~right_frames(beliefs) & (truth >= 0))[drawn]
-    bars = [
-        (_TRUE, colours[truth[drawn]][None]),
-        ((0.0, 1.0), colours[_stacked(*_shares(beliefs, drawn, places))]),
-        (_DECIDED, colours[decided[drawn]][None]),
-        (_WRONG, np.where(wrong[:, None], BLACK, WHITE)[None]),
-    ]
-    for (low, high), image in bars:
-        axes.imshow(image, extent=(0, frames, low, high), aspect="auto", interpolation="nearest", origin="lower")
-    axes.set(xlim=(0, frames), ylim=(_WRONG[0] - 0.05, _TRUE[1]))
-    _name_visits(axes, truth, places)
 
 
 def confusion_panel(axes: "Axes", evaluation: Evaluation) -> None:
@@ -101,7 +55,7 @@ def confusion_panel(axes: "Axes", evaluation: Evaluation) -> None:
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, interpolation="nearest")
     names = [shorten(place, 18) for place in evaluation.places]
-    cell = _inches(axes) * 72 / size
+    cell = inches(axes) * 72 / size
     axes.set_xticks(range(size), labels=names, rotation=90, fontsize=min(8, cell))
     axes.set_yticks(range(size), labels=names, fontsize=min(8, cell))
     axes.tick_params(length=0, pad=3)
@@ -109,7 +63,7 @@ def confusion_panel(axes: "Axes", evaluation: Evaluation) -> None:
     axes.set_ylabel("true place", fontsize=8, labelpad=6)
     axes.set_title("Confusion matrix: frames, darker for more of the row", loc="left", fontsize=8.5)
     axes.spines[:].set_color("0.7")
-    font = min(9.0, cell / (_LETTER * (1 + len(str(counts.max())))))
+    font = min(9.0, cell / (LETTER * (1 + len(str(counts.max())))))
     # Numbers that nobody can read only hide the colours.
     for row, column in np.argwhere(counts) if font >= 3.5 else []:
         colour = "white" if shares[row, column] > 0.55 else "black"
@@ -131,52 +85,24 @@ def legend_panel(axes: "Axes", places: Sequence[str]) -> None:
     axes.legend(handles=patches, loc="upper left", ncols=2, frameon=False, fontsize=8, borderaxespad=0)
 
 
-def _shares(beliefs: Beliefs, drawn: Ints, places: Sequence[str]) -> tuple[Floats, Ints]:
-    """The probabilities of the frames `drawn` (n, columns), and the place of each column."""
-    belief = beliefs.belief[drawn]
-    if beliefs.unknown is None:
-        return belief, Labels(beliefs.places).codes(places)
-    unknown = beliefs.unknown[drawn, None]
-    return np.hstack([belief * (1 - unknown), unknown]), Labels((*beliefs.places, UNKNOWN_PLACE)).codes(places)
-
-
-def _stacked(belief: Floats, place: Ints) -> Ints:
-    """The place at every height of the stacked beliefs: (rows from 0 to 1, frames)."""
-    heights = (np.arange(_BELIEF_ROWS) + 0.5) / _BELIEF_ROWS
-    below = (np.cumsum(belief, axis=1)[None] <= heights[:, None, None]).sum(axis=2)
-    # Rounding may leave the sum a hair under 1.
-    stacked: Ints = place[np.minimum(below, len(place) - 1)]
-    return stacked
-
-
-def _name_visits(axes: "Axes", truth: Ints, places: Sequence[str]) -> None:
-    """Write a place's name into its bar where there is room: colours alone are hard to look up."""
-    font = 6.5
-    room = _inches(axes) * 72 / len(truth)
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(truth)) + 1))
-    colours = place_colours(places)
-    for start, end in zip(starts, [*starts[1:], len(truth)], strict=True):
-        place = int(truth[start])
-        if place >= 0 and (end - start) * room > _LETTER * font * (len(places[place]) + 1):
-            colour = letter_colour(colours[place])
-            spot = ((start + end) / 2, sum(_TRUE) / 2 - 0.02)
-            axes.text(*spot, places[place], ha="center", va="center", fontsize=font, color=colour)
-
-
-def _inches(axes: "Axes") -> float:
-    return float(axes.bbox.width / axes.figure.dpi)
-
-
-def reliability_panel(axes: "Axes", found: Reliability) -> None:
-    """Draw accuracy over belief in 15 bins, the frames of each bin written in it; on the diagonal is calibrated."""
+def reliability_panel(axes: "Axes", below: "Axes", found: Reliability) -> None:
+    """Draw accuracy over belief in 15 bins, on the diagonal is calibrated; `below` it the frames of each bin."""
     edges = np.arange(ECE_BINS) / ECE_BINS
     some = found.frames > 0
-    axes.bar(edges[some], found.accuracy[some], 1 / ECE_BINS, align="edge", color=_BLUE, alpha=0.45, edgecolor="white")
-    axes.plot(found.belief[some], found.accuracy[some], "o", color=_BLUE, markersize=2.5)
-    for edge, frames in zip(edges[some].tolist(), found.frames[some].tolist(), strict=True):
-        axes.text(edge + 0.5 / ECE_BINS, 0.02, str(frames), rotation=90, ha="center", va="bottom", fontsize=5.5)
-    _square(axes, f"Reliability: ECE {found.error:.3f}", "belief in what was decided (frames inside)", "right")
     axes.plot([0, 1], [0, 1], color=_GREY, linewidth=0.8, linestyle="--")
+    axes.vlines(found.belief[some], found.belief[some], found.accuracy[some], color=_BLUE, linewidth=1.2, alpha=0.6)
+    # The area of a dot tells of the frames behind it.
+    share = found.frames[some] / found.frames.max(initial=1)
+    axes.scatter(found.belief[some], found.accuracy[some], s=8 + 40 * share, color=_BLUE, linewidths=0, zorder=3)
+    _square(axes, f"Reliability: ECE {found.error:.3f}", "", "right")
+    axes.tick_params(labelbottom=False)
+    below.bar(edges, found.frames, 1 / ECE_BINS, align="edge", color=_BLUE, alpha=0.6, edgecolor="white")
+    for edge, frames in zip(edges[some].tolist(), found.frames[some].tolist(), strict=True):
+        below.text(edge + 0.5 / ECE_BINS, frames, str(frames), rotation=90, ha="center", va="bottom", fontsize=5.5)
+    _square(below, "", "belief in what was decided, in 15 bins", "frames")
+    below.set_yscale("log")
+    below.set(ylim=(0.7, 60 * max(1, found.frames.max(initial=1))), yticks=[], yticklabels=[])
+    below.minorticks_off()
 
 
 def coverage_panel(axes: "Axes", found: RiskCoverage) -> None:
@@ -248,13 +174,15 @@ def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Pa
         reading = "Each strip is one sequence; the belief in each place is the height of its colour."
         some = f" {len(shown)} of {len(beliefs)} sequences: the best, the worst and evenly many between by accuracy."
         write_line(figure, 0.86, reading + some * (len(shown) < len(beliefs)), 8, "0.4")
+        axis = axis_of(shown)
         for number, sequence in enumerate(shown):
             axes = panel(figure, _STRIP_LEFT, _HEAD + 0.1 + step * number, _STRIP_WIDTH, strip)
-            belief_strip(axes, sequence, evaluation)
-        axes.set_xlabel("frame", fontsize=7, labelpad=1)
+            belief_strip(axes, sequence, evaluation, axis)
+        axes.set_xlabel(axis.label, fontsize=7, labelpad=1)
         legend_panel(panel(figure, _SIDE_LEFT, _HEAD, _WIDTH - MARGIN - _SIDE_LEFT, legend), evaluation.places)
         confusion_panel(panel(figure, _MATRIX_LEFT, _HEAD + legend + 0.5, matrix, matrix), evaluation)
-        reliability_panel(panel(figure, left, _HEAD + top, _CURVE, _CURVE), evaluation.reliability)
+        bins = panel(figure, left, _HEAD + top + _CURVE + _BINS_GAP, _CURVE, _BINS)
+        reliability_panel(panel(figure, left, _HEAD + top, _CURVE, _CURVE), bins, evaluation.reliability)
         beside = panel(figure, left + _CURVE_STEP, _HEAD + top, _CURVE, _CURVE)
         if evaluation.new_places is not None and evaluation.new_places.auroc is not None:
             roc_panel(beside, evaluation.new_places)

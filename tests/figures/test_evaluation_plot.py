@@ -13,7 +13,8 @@ from helpers.small_world import beliefs_of
 from placerec.errors import MissingExtraError, OutputError
 from placerec.evaluation.metrics import evaluate
 from placerec.figures.canvas import figure_file, place_colours
-from placerec.figures.evaluation import belief_strip, chosen, confusion_panel, plot_evaluation
+from placerec.figures.evaluation import chosen, confusion_panel, plot_evaluation
+from placerec.figures.strip import axis_of, belief_strip
 from placerec.hohmm.beliefs import Beliefs
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -199,3 +200,38 @@ def test_without_matplotlib_the_extra_is_named(tmp_path: Path, monkeypatch: pyte
         "a picture needs the package matplotlib, which is not installed: pip install 'placerec[plot]'"
     )
     assert list(tmp_path.iterdir()) == []
+
+
+def test_strips_are_drawn_over_time_on_one_scale(tmp_path: Path) -> None:
+    beliefs = [recording("seq1"), recording("seq2", 20)]
+    axis = axis_of(beliefs)
+    assert (axis.seconds, axis.end) == (1.0, pytest.approx(12.0))
+    plot_evaluation(beliefs, evaluate(beliefs), tmp_path / "a.svg")
+    assert "time from the first frame, s" in drawn_texts(tmp_path / "a.svg")
+    with figure_file(tmp_path / "a.png", 8, 3) as figure:
+        axes = figure.subplots()
+        belief_strip(axes, beliefs[1], evaluate(beliefs), axis)
+        assert axes.get_xlim() == (0, axis.end)
+        assert [image.get_extent()[1] for image in axes.images] == pytest.approx([4.0] * 4)
+
+
+def test_a_drive_of_hours_is_told_in_hours_and_frames_without_times_are_counted() -> None:
+    made = recording("seq1")
+    slow = replace(made, stream=replace(made.stream, table=replace(made.stream.table, times=made.times * 900)))
+    assert axis_of([slow]).label == "time from the first frame, h"
+    timeless = replace(made, stream=replace(made.stream, table=replace(made.stream.table, times=made.times * np.nan)))
+    assert axis_of([made, timeless]) == axis_of([timeless])
+    assert (axis_of([timeless]).label, axis_of([timeless]).end) == ("frame", 60)
+
+
+def test_while_no_frame_comes_nothing_is_drawn(tmp_path: Path) -> None:
+    made = recording("seq1")
+    times = made.times + 100 * (np.arange(60) >= 30)
+    late = replace(made, stream=replace(made.stream, table=replace(made.stream.table, times=times)))
+    with figure_file(tmp_path / "a.png", 8, 3) as figure:
+        axes = figure.subplots()
+        belief_strip(axes, late, evaluate([late]))
+        true = np.asarray(axes.images[0].get_array())[0]
+    # One column more than frames: it is empty, and lies after frame 29.
+    assert len(true) == 61
+    assert (true[30] == true.max()).all()

@@ -16,7 +16,8 @@ from placerec.evaluation.metrics import Evaluation
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.results import Row, Setting, by_seed
 from placerec.figures.canvas import figure_file, place_colours
-from placerec.figures.evaluation import belief_strip, confusion_panel, legend_panel
+from placerec.figures.evaluation import confusion_panel, legend_panel
+from placerec.figures.strip import axis_of, belief_strip
 from placerec.hohmm import Beliefs
 
 if TYPE_CHECKING:
@@ -101,8 +102,10 @@ def draw_strips(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Path, 
         *strips, legend = figure.subplots(
             len(shown) + 1, 1, height_ratios=[1.0] * len(shown) + [0.12 * (2 + len(evaluation.places) // 2)]
         )
+        axis = axis_of(shown)
         for axes, one in zip(strips, shown, strict=True):
-            belief_strip(axes, one, evaluation)
+            belief_strip(axes, one, evaluation, axis)
+        axes.set_xlabel(axis.label, fontsize=7, labelpad=1)
         legend_panel(legend, evaluation.places)
 
 
