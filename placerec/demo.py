@@ -10,7 +10,7 @@ import numpy as np
 from placerec.arrays import Mask
 from placerec.errors import check_optional
 from placerec.evaluation.metrics import Evaluation, evaluate
-from placerec.figures.canvas import figure_file
+from placerec.figures.canvas import figure_file, place_title
 from placerec.figures.evaluation import plot_evaluation
 from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import whole_folder, write_text
@@ -167,7 +167,7 @@ def _contact_sheet(images: Mapping[str, Mapping[str, Path]], path: Path) -> None
                     axes.imshow(read_gray(pictures[column]), cmap="gray", vmin=0, vmax=255)
             axes_row[0].set_ylabel(row)
         for column, axes in zip(columns, grid[0], strict=True):
-            axes.set_title(column)
+            axes.set_title(place_title(column), fontsize=9)
 
 
 def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, commands: str) -> str:

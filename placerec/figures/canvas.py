@@ -4,6 +4,7 @@ matplotlib is optional and is imported inside the functions; no pyplot, so no gl
 """
 
 import logging
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -37,6 +38,21 @@ _DPI = 130
 _BRIGHT = (0x56B4E9, 0xE69F00, 0x009E73, 0xCC79A7, 0x332288, 0xF0E442)
 _PALETTE = (*_BRIGHT, 0xD55E00, 0x0072B2, 0x999933, 0x882255, 0xDDCC77, 0x999999)
 WHITE, BLACK, _GREY = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.78, 0.78, 0.78)
+
+# The laboratory has them, too. Behind a code: which of several rooms, and which part of the building.
+_COLD_CODE = re.compile(r"([12]PO|[A-Z]+)\d*-[AB]")
+_COLD_PLACES = {
+    "CR": "corridor",
+    "PA": "printer area",
+    "TL": "toilet",
+    "ST": "stairs",
+    "KT": "kitchen",
+    "LO": "large office",
+    "1PO": "one-person office",
+    "2PO": "two-person office",
+    "TR": "terminal room",
+    "RL": "robot lab",
+}
 
 # The width of a letter of DejaVu Sans, in units of the font's size, on the safe side.
 LETTER = 0.66
@@ -103,6 +119,13 @@ def place_colours(places: Sequence[str]) -> Floats:
     colours: Floats = base[index % len(base)] * 0.6 ** (index // len(base))[:, None]
     colours[[place == UNKNOWN_PLACE for place in places]] = _GREY
     return colours
+
+
+def place_title(place: str) -> str:
+    """A place's name as a picture's legend has it: what COLD's codes mean stands behind them (`CR-B corridor`)."""
+    code = _COLD_CODE.fullmatch(place)
+    meaning = _COLD_PLACES.get(code[1]) if code else None
+    return f"{place} {meaning}" if meaning else place
 
 
 def letter_colour(ground: Floats) -> str:

@@ -23,6 +23,7 @@ from placerec.figures.canvas import (
     inches,
     panel,
     place_colours,
+    place_title,
     write_line,
 )
 from placerec.figures.strip import axis_of, belief_strip
@@ -55,9 +56,10 @@ def confusion_panel(axes: "Axes", evaluation: Evaluation) -> None:
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, interpolation="nearest")
     names = [shorten(place, 18) for place in evaluation.places]
+    titles = [shorten(place_title(place), 24) for place in evaluation.places]
     cell = inches(axes) * 72 / size
     axes.set_xticks(range(size), labels=names, rotation=90, fontsize=min(8, cell))
-    axes.set_yticks(range(size), labels=names, fontsize=min(8, cell))
+    axes.set_yticks(range(size), labels=titles, fontsize=min(8, cell))
     axes.tick_params(length=0, pad=3)
     axes.set_xlabel("decided place", fontsize=8)
     axes.set_ylabel("true place", fontsize=8, labelpad=6)
@@ -76,7 +78,7 @@ def legend_panel(axes: "Axes", places: Sequence[str]) -> None:
     from matplotlib.patches import Patch
 
     colours = [*map(tuple, place_colours(places).tolist()), BLACK, WHITE]
-    labels = [*(shorten(place, 22) for place in places), "decided wrongly", "no label"]
+    labels = [*(shorten(place_title(place), 24) for place in places), "decided wrongly", "no label"]
     patches = [
         Patch(facecolor=colour, edgecolor="0.5", linewidth=0.5, label=label)
         for colour, label in zip(colours, labels, strict=True)

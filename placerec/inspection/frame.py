@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Singles
 from placerec.evaluation.summary import percent, shorten
-from placerec.figures.canvas import MARGIN, figure_file, panel, picture_file, write_line
+from placerec.figures.canvas import MARGIN, figure_file, panel, picture_file, place_title, write_line
 from placerec.frames import Sequence, SourceOptions, read_gray
 from placerec.frames.sequence import Gray
 from placerec.inspection.words import WordTable, look_up, typical_images
@@ -143,7 +143,7 @@ def unit_note(view: FrameView, unit: int) -> str:
     if row["place"] is None:
         return "no labelled frame given"
     place = int(view.table.place[unit])
-    return f"{shorten(view.table.places[place], 32)} ({percent(float(view.table.share[unit]))})"
+    return f"{shorten(place_title(view.table.places[place]), 32)} ({percent(float(view.table.share[unit]))})"
 
 
 def draw_frame_sheet(view: FrameView, typical: Mapping[int, Gray], path: Path | str) -> None:
@@ -176,6 +176,9 @@ def draw_frame_sheet(view: FrameView, typical: Mapping[int, Gray], path: Path | 
             _values(bare(MARGIN + step + 0.3, _HEAD, _WIDTH - 2 * MARGIN - step - 0.3), view.values)
         _map(bare(MARGIN, second), view)
         left, room = MARGIN + step, _WIDTH - 2 * MARGIN - step
+        if not pictures:
+            _distances(bare(left + 0.8, second, room - 0.8), view)
+            return
         wide = (room + 0.15) / len(view.nearest) - 0.15
         for rank, unit in enumerate(view.nearest):
             axes = bare(left + rank * (wide + 0.15), second, wide)
@@ -249,16 +252,31 @@ def _map(axes: "Axes", view: FrameView) -> None:
     axes.spines[:].set_color("0.7")
 
 
+def _distances(axes: "Axes", view: FrameView) -> None:
+    """The nearest units where there is no picture of them: how far each is, and what there is to say of it."""
+    rows = np.arange(len(view.nearest))
+    colours = [_MARK if unit == view.unit else "0.5" for unit in view.nearest]
+    distances = [float(view.distances[unit]) for unit in view.nearest]
+    axes.barh(rows, distances, 0.55, color=colours)
+    axes.set_yticks(rows, labels=[view.words[unit] for unit in view.nearest], fontsize=8.5)
+    axes.tick_params(axis="y", length=0)
+    axes.spines[:].set_visible(False)
+    axes.set(xlim=(0, 1.6 * max(distances)), ylim=(len(rows) - 0.5, -0.5))
+    for row, unit in enumerate(view.nearest):
+        note = ", ".join(filter(None, (f"{view.distances[unit]:.3g}", unit_note(view, unit))))
+        axes.text(distances[row] + 0.01 * max(distances), row, note, fontsize=8, va="center", color="0.25")
+    axes.set_title("How far the nearest units are; a SOURCE would show what they look like", loc="left", fontsize=8.5)
+
+
 def _unit(axes: "Axes", view: FrameView, unit: int, picture: NDArray[Any] | None) -> None:
     """One of the nearest units: its typical frame if there is one, how far it is, and what there is to say of it."""
     chosen = unit == view.unit
+    axes.set_anchor("N")
     if picture is None:
-        axes.set_facecolor("0.95")
-        hint = "no frame to show" if view.table is not None else "give a SOURCE to see it"
-        axes.text(0.5, 0.5, hint, transform=axes.transAxes, ha="center", fontsize=8, color="0.5")
+        axes.spines[:].set_visible(False)
+        axes.text(0, 1, "the word of no frame here", transform=axes.transAxes, va="top", fontsize=8, color="0.4")
     else:
         axes.imshow(picture, cmap="gray", vmin=0, vmax=255, aspect="auto")
-    axes.set_anchor("N")
-    axes.spines[:].set(color=_MARK if chosen else "0.7", linewidth=2.5 if chosen else 0.8)
+        axes.spines[:].set(color=_MARK if chosen else "0.7", linewidth=2.5 if chosen else 0.8)
     axes.set_title(f"{view.words[unit]}, distance {view.distances[unit]:.3g}", loc="left", fontsize=8.5)
     axes.set_xlabel(unit_note(view, unit), fontsize=7.5, loc="left", color="0.25")

@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints
 from placerec.evaluation.summary import shorten
-from placerec.figures.canvas import MARGIN, figure_file, letter_colour, panel, picture_file, place_colours, write_line
+from placerec.figures.canvas import (
+    MARGIN,
+    figure_file,
+    letter_colour,
+    panel,
+    picture_file,
+    place_colours,
+    place_title,
+    write_line,
+)
 from placerec.frames import SourceOptions
 from placerec.frames.sequence import Gray
 from placerec.inspection.words import WordTable, look_up, typical_images, word_sentences
@@ -29,11 +38,11 @@ _PIXELS = 128
 _FRAME, _BAR = 0.05, 0.09
 _UNLABELLED, _EMPTY, _PAPER = (0.62, 0.62, 0.62), (0.93, 0.93, 0.93), (1.0, 1.0, 1.0)
 _READING = (
-    "Tiles lie as the units do on the map: the nearest frame to the unit, framed in the colour of the place that most "
-    "frames of the word have (its number in the corner); right: training frames that hit the unit; bar below: its "
-    "frames by place. Blank: the word of no frame here; crossed: hit by no training frame. "
+    "Tiles lie as the units do on the map. Blank: the word of no frame here; crossed: hit by no training frame. "
     "U-matrix: the mean distance of a unit to the four around it."
 )
+# The tile that is explained: its width, and the height of its place beside the lattice, in inches.
+_EXAMPLE, _EXAMPLE_HIGH = 1.25, 1.75
 
 
 @dataclass(frozen=True)
@@ -99,20 +108,73 @@ def draw_word_sheet(table: WordTable, images: Mapping[int, Gray], path: Path | s
     legend = _ROW * (len(table.places) + 2)
     # Below each other where the lattice is high enough for it, else side by side.
     beside = (_SIDE - 0.3) / 2
-    below = min(3.0, (lattice[1] + 0.2 - legend) / 2 - 0.75)
+    example = _example_unit(table) if images else None
+    legend_top = head + (0.0 if example is None else _EXAMPLE_HIGH)
+    below = min(3.0, (lattice[1] + 0.2 - (legend_top - head) - legend) / 2 - 0.75)
     maps = max(beside, below)
-    height = head + max(0.3 + lattice[1], legend + 0.8 + maps) + MARGIN
+    height = max(head + 0.3 + lattice[1], legend_top + legend + 0.8 + maps) + MARGIN
     with figure_file(path, width, height) as figure:
         write_line(figure, 0.42, shorten(title, int(width * 7.8)), 15)
         for number, line in enumerate(lines):
             write_line(figure, 0.7 + 0.17 * number, line, 8.5, "0.25")
         _lattice(panel(figure, MARGIN + 0.3, head + 0.2, *lattice), table, pictures, tiles)
         side = MARGIN + 0.3 + lattice[0] + _GAP
-        _legend(panel(figure, side, head, _SIDE, legend), table)
-        top = head + legend + 0.5
+        if example is not None:
+            _example(panel(figure, side, head, _SIDE, _EXAMPLE_HIGH), table, pictures[example], aspect, example)
+        _legend(panel(figure, side, legend_top, _SIDE, legend), table)
+        top = legend_top + legend + 0.5
         _heat(panel(figure, side, top, maps, maps), table, table.hits, "Blues", "Training frames per unit")
         spot = (side, top + maps + 0.75) if below >= beside else (side + maps + 0.3, top)
         _heat(panel(figure, *spot, maps, maps), table, table.u_matrix, "Greys", "U-matrix")
+
+
+def _example_unit(table: WordTable) -> int | None:
+    """The tile to explain: of those with a frame and a training frame the one whose frames are of most places."""
+    shown = (table.typical >= 0) & (table.hits > 0)
+    if not shown.any():
+        return None
+    return int(np.lexsort((table.frames, (table.votes > 0).sum(axis=1), shown))[-1])
+
+
+def _example(axes: "Axes", table: WordTable, picture: Any, aspect: float, unit: int) -> None:
+    """One tile alone, and beside it what its parts are; x and y are inches from the upper left corner."""
+    from matplotlib.patches import Rectangle
+
+    tile = _Tiles(1, _EXAMPLE / max(1.0, aspect), aspect)
+    top = 0.25
+    axes.set(xlim=(0, _SIDE), ylim=(_EXAMPLE_HIGH, 0))
+    axes.axis("off")
+    axes.text(0, 0.1, f"How to read a tile: {table.words[unit]}", size=8.5, va="center")
+    colours = np.vstack([place_colours(table.places), _UNLABELLED])
+    place, hits = int(table.place[unit]), int(table.hits[unit])
+    pad = tile.width * _FRAME
+    box = pad / 2, top + pad / 2, tile.width - pad, tile.height - pad
+    axes.add_patch(Rectangle(box[:2], *box[2:], facecolor=tuple(colours[place]), linewidth=0))
+    low = top + tile.height - pad - tile.width * _BAR
+    for start, share, colour in _bar(table.votes[unit], colours):
+        wide = tile.inner * share
+        axes.add_patch(Rectangle((pad + tile.inner * start, low), wide, tile.width * _BAR, facecolor=colour))
+    extent = pad, pad + tile.inner, top + pad + tile.inner * aspect, top + pad
+    axes.imshow(_tile(picture, aspect), cmap="gray", vmin=0, vmax=255, extent=extent, zorder=2)
+    axes.set(xlim=(0, _SIDE), ylim=(_EXAMPLE_HIGH, 0), aspect="auto")
+    middle, bar = top + pad + tile.inner * aspect / 2, low + tile.width * _BAR / 2
+    marks = [(pad * 2, "left", str(place + 1), colours[place])] if place >= 0 else []
+    for x, side, text, ground in [*marks, (tile.width - pad * 2, "right", str(hits), np.ones(3))]:
+        paint: dict[str, Any] = {"boxstyle": "square,pad=0.18", "linewidth": 0, "facecolor": (*ground, 0.85)}
+        axes.text(x, top + 0.14, text, size=8, ha=side, va="center", color=letter_colour(ground), bbox=paint, zorder=4)
+    belongs = "frame: no label"
+    if place >= 0:
+        belongs = f"frame and number: {shorten(table.places[place], 16)},\nwhere most of its frames are"
+    notes = [
+        (tile.width - pad, top + pad / 2, 0.08, belongs),
+        (tile.width - pad, top + 0.14, 0.44, "training frames that hit the unit"),
+        (tile.width * 0.8, middle, 0.75, "the frame nearest to the unit"),
+        (tile.width * 0.8, bar, 1.06, "its frames by place"),
+    ]
+    right = tile.width + 0.3
+    for x, y, at, note in notes:
+        axes.plot((x, right - 0.06), (y, top + at), color="0.45", linewidth=0.7, zorder=5)
+        axes.text(right, top + at, note, size=7.5, va="center", color="0.2", linespacing=1.15)
 
 
 def _lattice(axes: "Axes", table: WordTable, pictures: Sequence[Any], tiles: _Tiles) -> None:
@@ -215,7 +277,7 @@ def _legend(axes: "Axes", table: WordTable) -> None:
     for row, (number, colour, place, words, frames) in enumerate(lines, start=1):
         axes.add_patch(Rectangle((0, row + 0.08), 0.3, 0.84, facecolor=tuple(colour), linewidth=0))
         axes.text(0.15, row + 0.53, number, size=7.5, ha="center", va="center", color=letter_colour(colour))
-        axes.text(0.42, row + 0.53, shorten(place, 32), size=8.5, va="center")
+        axes.text(0.42, row + 0.53, shorten(place_title(place), 32), size=8.5, va="center")
         axes.text(_SIDE - 0.65, row + 0.53, str(words), size=8.5, ha="right", va="center")
         axes.text(_SIDE, row + 0.53, str(frames), size=8.5, ha="right", va="center")
 

@@ -104,6 +104,17 @@ def test_the_sheet_holds_every_place_and_every_number(world: Path, tmp_path: Pat
     assert "(no label)" not in text
 
 
+def test_one_tile_is_explained(world: Path, tmp_path: Path) -> None:
+    text = draw(world, table(5, ("CR-B", "hall")), tmp_path / "a.svg")
+    assert any(one.startswith("How to read a tile: w") for one in text)
+    for note in ("training frames that hit the unit", "the frame nearest to the unit", "its frames by place"):
+        assert note in text
+    # COLD's codes are spelled out.
+    assert "CR-B corridor" in text
+    bare = replace(table(3, ("hall",)), hits=np.zeros(9, np.int64))
+    assert not any("How to read" in one for one in draw(world, bare, tmp_path / "b.svg"))
+
+
 def test_without_labels_the_sheet_says_so(world: Path, tmp_path: Path) -> None:
     text = draw(world, table(3, ()), tmp_path / "a.svg")
     assert "(no label)" in text
@@ -132,7 +143,8 @@ def test_long_names_of_many_places_are_shortened_and_nothing_leaves_the_sheet(
     words = table(size, places)
     words = replace(words, words=tuple(f"placenormalised20.w{unit:03d}" for unit in range(size**2)))
     draw_word_sheet(words, typical(world, words), tmp_path / "a.png", title=f"The words of {'x' * 300}.npz")
-    assert sum("…" in text for text in inside) == 31
+    # The title, the places, and the one of the explained tile.
+    assert sum("…" in text for text in inside) == 32
     assert [text for text, within in inside.items() if not within] == []
 
 
@@ -149,7 +161,9 @@ def test_what_is_not_gist_has_bars_and_no_roses(world: Path, tmp_path: Path) -> 
         assert f"Edges of the {name} scale" not in bars
     assert any(text.startswith("A rose") for text in roses)
     assert not any(text.startswith("A rose") for text in bars)
-    assert "give a SOURCE to see it" in roses
+    # No box stays empty: the nearest units are rows where there is no picture of them.
+    assert "How far the nearest units are; a SOURCE would show what they look like" in roses
+    assert "the word of no frame here" not in roses
 
 
 def test_words_of_a_matrix_are_shown_and_cannot_be_made_from_images(world: Path, tmp_path: Path) -> None:
