@@ -68,7 +68,7 @@ def format_learned(learned: Learned) -> str:
     quality = made.dictionaries[0].quality
     sizes = ", ".join(f"{len(one.hits)} ({one.name or 'the first'})" for one in made.dictionaries)
     lines = [
-        f"words     {sizes}: learned from {quality.used} frames of {len(made.sequences)} sequences",
+        f"words     {sizes}: learned from {quality.used} frames of {_sequences(len(made.sequences))}",
         f"places    {len(evidence.frames)}: " + ", ".join(f"{place} {n}" for place, n in evidence.frames.items()),
         f"weights   {evidence}",
     ]
@@ -77,7 +77,11 @@ def format_learned(learned: Learned) -> str:
         loss, majority = found.log_loss, found.majority_accuracy
         lines.append(
             f"tests     accuracy {100 * found.accuracy:.1f} % (majority class {100 * majority:.1f} %), log loss "
-            f"{loss:.3f}, ECE {found.ece:.3f} on {found.frames} frames of {len(found.sequences)} sequences"
+            f"{loss:.3f}, ECE {found.ece:.3f} on {found.frames} frames of {_sequences(len(found.sequences))}"
         )
     lines.append(f"model     {learned.out}: `placerec decode SOURCE -m {learned.out}` needs nothing else")
     return "\n".join(lines)
+
+
+def _sequences(count: int) -> str:
+    return f"{count} sequence{'s' * (count != 1)}"

@@ -2,8 +2,9 @@
 
 As in `hohmm.weights`: the likelihoods of a point or a word count to the power of alpha, and at each step the filter
 replaces the share `memory` of its belief by the places' shares. Both have the least log loss on training sequences that
-were held out, five groups of them at most, for which likelihoods, transitions and shares are learned without each; of a
-single sequence nothing is held out, and they stay 1 and 0. (Components and words are those of all training sequences.)
+were held out, five groups of neighbours at most, for which likelihoods, transitions and shares are learned without
+each; of a single sequence nothing is held out, and they stay 1 and 0. (Components and words are those of all training
+sequences.)
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -16,9 +17,9 @@ from placerec.hohmm import Emissions, learned_transition
 from placerec.hohmm.evidence import DictionaryModels, Evidence, evidence_in
 from placerec.hohmm.weights import HeldOut, Weights, choose_weights, shares_of
 from placerec.lm.logs import LN10
-from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints, MakePointStepper, filtered, held_out_folds
+from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints, MakePointStepper, filtered
 from placerec.methods.training_set import TrainingSet, make_training_set
-from placerec.model.evidence import GROUPS, group_borders
+from placerec.model.evidence import group_borders
 from placerec.words import Selection, WordStream, place_steps, sentences_per_place
 from placerec.words.stream import FIRST
 
@@ -34,15 +35,16 @@ def fit(training: DescriptorTrainingSet, likelihoods: FitPoints) -> MakePointSte
 
 def best_weights(training: DescriptorTrainingSet, likelihoods: FitPoints) -> Weights:
     """The weights with the least log loss on held-out training sequences."""
-    several = len(np.unique(training.sequences)) > 1
-    return choose_weights(_held_out(training, likelihoods) if several else (), 1)
+    return choose_weights(_held_out(training, likelihoods), 1)
 
 
 def _held_out(training: DescriptorTrainingSet, likelihoods: FitPoints) -> Iterator[HeldOut]:
-    for held in held_out_folds(training.sequences, GROUPS):
+    numbers = np.unique(training.sequences)
+    for group in group_borders(len(numbers)):
+        held: Mask = np.isin(training.sequences, numbers[group])
         rest = without(training, held)
         of_point, frames = likelihoods(rest), np.bincount(rest.truth, minlength=len(rest.places))
-        for sequence in np.unique(training.sequences[held]):
+        for sequence in numbers[group]:
             rows = np.flatnonzero(training.sequences == sequence)
             log10_p = np.array([of_point(point) for point in training.points[rows]]) / LN10
             every, elapsed = np.ones(len(rows), bool), np.minimum(np.arange(len(rows)), 1.0)

@@ -62,6 +62,8 @@ def test_tests_train_nothing_and_are_judged(tmp_path: Path, runs: list[Path]) ->
     lines = format_learned(found).splitlines()
     assert [line.split()[0] for line in lines] == ["words", "places", "weights", "tests", "model"]
     assert "majority class 50.0 %" in lines[3]
+    assert lines[0].endswith(" frames of 3 sequences")
+    assert lines[3].endswith(" on 16 frames of 1 sequence")
 
 
 def test_again_it_replaces_what_it_made(tmp_path: Path, runs: list[Path]) -> None:
