@@ -66,17 +66,15 @@ def run_demo(
         with progress("render") as show:
             render_lab(folder / "lab", scale=scale, seed=seed, progress=show)
         sequences = find_sequences([folder / "lab"])
-        log.info("Learning 100 visual words from runs 1 and 2, and translating all runs")
         with progress("describe") as show:
             descriptors = describe(sequences, progress=show)
+        log.info("Learning visual words from runs 1 and 2, and translating all runs")
         training = np.array([not name.endswith(TEST_RUN) for name in descriptors.sequences])
-        dictionary = Dictionary.fit(
-            descriptors.values[training], spec=descriptors.spec, options=DictionaryOptions(seed=seed)
-        )
+        beliefs = {} if as_in_paper else {LEARNED: _learned(folder, descriptors, training, seed)}
+        dictionary = _paper_dictionary(folder, descriptors.take(training), seed)
         dictionary.save(folder / "words.npz")
         write_tokens(tokens_of(descriptors, dictionary), DictionarySet.of(dictionary), folder / "tokens")
         log.info("Training language models and recognising run 3")
-        beliefs = {} if as_in_paper else {LEARNED: _learned(folder, descriptors, training, seed)}
         beliefs |= {way: _recognise(folder, *way) for way in product(SMOOTHINGS, ORDERS)}
         results = {way: evaluate(found) for way, found in beliefs.items()}
         best = BEST if as_in_paper else LEARNED
@@ -109,6 +107,14 @@ def _learned(folder: Path, descriptors: Descriptors, training: Mask, seed: int) 
     learn_folder(model, train.values, train.table, train.spec, DictionarySetOptions(seed=seed), ModelOptions())
     streams = tokens_of(test, DictionarySet.load(model.words))
     return _decoded(model.path, streams, folder / "beliefs" / LEARNED[0])
+
+
+def _paper_dictionary(folder: Path, training: Descriptors, seed: int) -> Dictionary:
+    """The paper's words: the first of those that `_learned` left in the `folder`, or learned here if there are none."""
+    left = ModelFolder(folder / "model").words
+    if left.exists():
+        return DictionarySet.load(left).dictionaries[0]
+    return Dictionary.fit(training.values, spec=training.spec, options=DictionaryOptions(seed=seed))
 
 
 def _decoded(model: Path, streams: Sequence[WordStream], out: Path) -> list[Beliefs]:
@@ -175,8 +181,8 @@ def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, c
         paragraph(
             f"A camera was driven through a small office laboratory: {frames} frames in 18 sequences. The laboratory "
             "is synthetic, rendered by placerec itself; its results say that the program works, not how well it does "
-            "in your rooms. Every frame became one visual word, every place an n-gram language model of its words, "
-            "and a Bayesian filter followed the belief over places through the six sequences that trained nothing."
+            f"in your rooms. {_method(results)} A Bayesian filter followed the belief over places through the six "
+            "sequences that trained nothing."
         ),
         heading("The synthetic laboratory"),
         picture(
@@ -210,6 +216,16 @@ def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, c
         preformatted(commands),
     ]
     return html_page("placerec: which place is the camera in?", body)
+
+
+def _method(results: DemoResults) -> str:
+    if LEARNED not in results:
+        return "Every frame became one visual word, every place an n-gram language model of its words."
+    return (
+        "Every frame became a visual word of each of several dictionaries, every place an n-gram language model for "
+        "each of them, and how much all words weigh was learned. The paper's systems have the first dictionary alone, "
+        "whose words and models are shown below."
+    )
 
 
 def _results_table(results: DemoResults) -> str:
