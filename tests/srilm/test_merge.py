@@ -66,6 +66,37 @@ def test_an_n_gram_that_a_file_repeats_stays_apart(tmp_path: Path) -> None:
     assert merge(*written(tmp_path, "a 1\na 2\n", "a 3\n"))[1] == "a\t4\na\t2\n"
 
 
+def _numbered(start: int, step: int, count: int) -> str:
+    return "".join(f"w{number:06d} v\t{number % 7}\n" for number in range(start, start + step * count, step))
+
+
+@pytest.mark.parametrize("odd", ["", "## a comment\n", "\n", "w006000  v 0\n", "w006000\t1.9\n", "w006000 v\t00\n"])
+def test_files_larger_than_what_is_read_at_once(odd: str, tmp_path: Path) -> None:
+    third = _numbered(0, 6, 1000) + odd + _numbered(6001, 6, 1000)
+    names = written(tmp_path, _numbered(0, 2, 5000), _numbered(0, 3, 4000), third)
+    total: Counter[str] = Counter()
+    for name in names:
+        for line in Path(name).read_text().splitlines():
+            if line and not line.startswith("#"):
+                *words, count = line.split()
+                total[" ".join(words)] += int(float(count))
+    expected = "".join(f"{ngram}\t{count}\n" for ngram, count in sorted(total.items()))
+    assert merge(*names) == (0, expected, "")
+
+
+def test_a_malformed_line_far_behind_is_named_when_it_is_reached(tmp_path: Path) -> None:
+    names = written(tmp_path, _numbered(0, 2, 5000) + "w020000 v\tx\nz\t1\n", _numbered(0, 2, 6000))
+    message = "malformed N-gram count or more than 100 words per line"
+    status, out, err = merge(*names)
+    assert (status, err) == (0, f"{names[0]}: line 5001: {message}\n")
+    assert out.splitlines()[4999:5001] == [f"w009998 v\t{2 * (9998 % 7)}", f"w010000 v\t{10000 % 7}"]
+
+
+def test_what_is_not_in_order_far_behind_stays_apart(tmp_path: Path) -> None:
+    names = written(tmp_path, _numbered(0, 2, 5000) + "w000000 v\t5\n", _numbered(0, 2, 6000))
+    assert merge(*names)[1].splitlines()[4999:5002] == ["w009998 v\t4", "w000000 v\t5", "w010000 v\t4"]
+
+
 Table = dict[tuple[str, ...], int]
 _TABLES = st.lists(
     st.dictionaries(
