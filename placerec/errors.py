@@ -54,16 +54,18 @@ class MissingExtraError(PlacerecError):
         return f"{purpose} needs the package {package}, which is not installed: {remedy}"
 
 
-# By the name that it is imported under: what a user calls the package, and what installs it.
+# By the name that it is imported under: what a user calls the package, and what pip is to install, all of an extra.
+_BAG = "rosbags mcap mcap-protobuf-support"
 _OPTIONAL = {
-    "matplotlib": ("matplotlib", "pip install 'placerec[plot]'"),
-    "sklearn": ("scikit-learn", "pip install 'placerec[systems]'"),
-    "rosbags": ("rosbags", "pip install 'placerec[bag]'"),
-    "av": ("PyAV", "pip install 'placerec[video]'"),
-    "mcap": ("mcap", "pip install 'placerec[bag]'"),
-    "mcap_protobuf": ("mcap-protobuf-support", "pip install 'placerec[bag]'"),
-    "distributed": ("distributed", "pip install 'placerec[cluster]'"),
-    "kenlm": ("kenlm", "pip install kenlm (it is compiled; not on Windows, nor on Python 3.13)"),
+    "matplotlib": ("matplotlib", "matplotlib"),
+    "sklearn": ("scikit-learn", "scikit-learn"),
+    "rosbags": ("rosbags", _BAG),
+    "av": ("PyAV", "av"),
+    "mcap": ("mcap", _BAG),
+    "mcap_protobuf": ("mcap-protobuf-support", _BAG),
+    "distributed": ("distributed", "distributed"),
+    # Where kenlm was beside it and is uninstalled, the module goes, and pip takes ufal-kenlm for installed.
+    "kenlm": ("kenlm", "--force-reinstall ufal-kenlm"),
 }
 
 
@@ -73,14 +75,18 @@ def check_optional(module: str, purpose: str, instead: str = "") -> None:
     To be called before any work, and not where the package is used at the end of it. `instead`: another remedy.
     """
     # Errors are known to whatever starts, which is to be quick.
+    import shlex
+    import sys
     from importlib.util import find_spec
 
-    package, remedy = _OPTIONAL[module]
+    package, wanted = _OPTIONAL[module]
     try:
         found = find_spec(module) is not None
     except ImportError:
         found = False
     if not found:
+        # Not the name of the extra: that needs the sources, and to know where they are.
+        remedy = f"{shlex.quote(sys.executable)} -m pip install {wanted}"
         raise MissingExtraError(package, purpose, ", or ".join(filter(None, (remedy, instead))))
 
 

@@ -34,7 +34,7 @@ from placerec.vision import (
 )
 from placerec.words.tokenize import tokenize
 
-pytest.importorskip("distributed", reason="needs the extra: pip install 'placerec[cluster]'")
+pytest.importorskip("distributed", reason="needs the extra: pip install '.[cluster]'")
 
 SPEC = DescriptorSpec(image_size=16)
 T = TypeVar("T")

@@ -60,7 +60,7 @@ def test_an_exception_comes_through(jobs: int) -> None:
 
 
 def lack(number: int) -> int:
-    raise MissingExtraError("rosbags", "a bag", "pip install 'placerec[bag]'")
+    raise MissingExtraError("rosbags", "a bag", "pip install rosbags")
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

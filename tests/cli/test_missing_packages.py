@@ -1,14 +1,16 @@
 """What a command needs at its end is looked for before it begins."""
 
+import sys
 from pathlib import Path
 
 import pytest
 from helpers.missing_packages import run_without
 
-PICTURE = "placerec: a picture needs the package matplotlib, which is not installed: pip install 'placerec[plot]'\n"
+PIP = f"{sys.executable} -m pip install"
+PICTURE = f"placerec: a picture needs the package matplotlib, which is not installed: {PIP} matplotlib\n"
 KNN = (
     "placerec: knn needs the package scikit-learn, which is not installed: "
-    "pip install 'placerec[systems]', or leave it out of --methods\n"
+    f"{PIP} scikit-learn, or leave it out of --methods\n"
 )
 
 

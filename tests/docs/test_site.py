@@ -44,7 +44,7 @@ class Page(HTMLParser):
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built site; whatever mkdocs has to say about it is an error."""
     if missing := [name for name in PARTS if importlib.util.find_spec(name) is None]:
-        pytest.skip(f"the site needs {', '.join(missing)}: pip install 'placerec[docs]'")
+        pytest.skip(f"the site needs {', '.join(missing)}: pip install '.[docs]'")
     out = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(ROOT / ".mkdocs.yml"), "-d", str(out)]
     # Material's banner about its own future is no warning about these pages.

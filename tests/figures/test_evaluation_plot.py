@@ -197,7 +197,7 @@ def test_without_matplotlib_the_extra_is_named(tmp_path: Path, monkeypatch: pyte
     with pytest.raises(MissingExtraError) as raised:
         plot_evaluation(beliefs, evaluate(beliefs), tmp_path / "a.png")
     assert str(raised.value) == (
-        "a picture needs the package matplotlib, which is not installed: pip install 'placerec[plot]'"
+        f"a picture needs the package matplotlib, which is not installed: {sys.executable} -m pip install matplotlib"
     )
     assert list(tmp_path.iterdir()) == []
 

@@ -315,5 +315,5 @@ def test_without_rosbags_it_is_said_how_to_get_it(tmp_path: Path, monkeypatch: p
     for name in [name for name in sys.modules if name.startswith("rosbags")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "rosbags", None)
-    with pytest.raises(MissingExtraError, match=r"needs the package rosbags.*pip install 'placerec\[bag\]'"):
+    with pytest.raises(MissingExtraError, match=r"needs the package rosbags.* -m pip install rosbags mcap"):
         find_one(path)
