@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -205,3 +206,31 @@ def test_an_editable_install_is_a_path_that_type_checkers_follow(tmp_path: Path)
     )
     done = subprocess.run([sys.executable, "-S", "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert (done.stdout, done.stderr) == (f"{clone / 'placerec/__init__.py'} placerec.vision.gist\n", "")
+
+
+@pytest.mark.parametrize("before", ["kenlm-0.3.0", "ufal_kenlm-26.4.1", ""])
+def test_an_environment_made_with_kenlm_gives_it_up_first(before: str, tmp_path: Path) -> None:
+    """Else both would own the module's file, and uninstalling one would take it from the other."""
+    for name in ("bin", "placerec"):
+        (tmp_path / name).mkdir()
+    for name in ("bin/environment", "pyproject.toml"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    bin_of_venv = tmp_path / ".venv/bin"
+    bin_of_venv.mkdir(parents=True)
+    for name in ("python", "pip"):
+        (bin_of_venv / name).write_text(f'#!/bin/sh\necho "$*" >> {shlex.quote(str(tmp_path / "asked"))}\n', "utf-8")
+        (bin_of_venv / name).chmod(0o755)
+    if before:
+        (tmp_path / f".venv/lib/python3.11/site-packages/{before}.dist-info").mkdir(parents=True)
+
+    command = ["sh", "-c", ". bin/environment", "bin/demo"]
+    for _ in range(2):
+        done = subprocess.run(
+            command, cwd=tmp_path, env={**os.environ, "EXTRAS": "plot"}, capture_output=True, text=True, check=True
+        )
+    assert done.stderr == "", "the second time there is nothing to install"
+    asked = (tmp_path / "asked").read_text("utf-8").splitlines()
+    gone = ["-m pip uninstall --quiet --yes kenlm ufal-kenlm"] if before.startswith("kenlm") else []
+    installed = "-m pip install --quiet --disable-pip-version-check --editable .[plot]"
+    compiled = "-m compileall -q placerec"
+    assert asked == [*gone, installed, compiled, compiled]

@@ -20,7 +20,7 @@ from placerec import find_sequences, read_gray
 def features(path: Path) -> NDArray[np.float32]:
     """The descriptor of an image, float32 (d,): any d up to 4096, on any scale, compared by Euclidean distance."""
     small = cv2.resize(read_gray(path), (16, 12), interpolation=cv2.INTER_AREA).astype(np.float32).ravel()
-    return np.asarray((small - small.mean()) / max(small.std(), 1.0), np.float32)
+    return np.asarray((small - small.mean()) / max(float(small.std()), 1.0), np.float32)
 
 
 def main() -> None:

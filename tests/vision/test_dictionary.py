@@ -117,7 +117,7 @@ def test_seeds(tmp_path: Path, dictionary: Dictionary) -> None:
 
 def test_fraction_draws_frames_by_the_seed() -> None:
     some, again, other = (fit(fraction=0.25, seed=seed) for seed in (0, 0, 1))
-    assert (some.quality.frames, some.quality.used, some.hits.sum()) == (300, 75, 75)
+    assert (some.quality.frames, some.quality.used, int(some.hits.sum())) == (300, 75, 75)
     assert some.fingerprint == again.fingerprint
     assert (some.pca.mean != other.pca.mean).any()
 

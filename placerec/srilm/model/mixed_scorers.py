@@ -13,7 +13,7 @@ from placerec.srilm.text.vocabulary import WordList
 
 
 def _longest(views: Sequence[Sighted]) -> Ints:
-    longest: Ints = np.max([view.used for view in views], axis=0)
+    longest: Ints = np.stack([view.used for view in views]).max(axis=0)
     return longest
 
 
