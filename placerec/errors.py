@@ -64,6 +64,7 @@ _OPTIONAL = {
     "mcap": ("mcap", _BAG),
     "mcap_protobuf": ("mcap-protobuf-support", _BAG),
     "distributed": ("distributed", "distributed"),
+    "waitress": ("waitress", "waitress"),
     # Where kenlm was beside it and is uninstalled, the module goes, and pip takes ufal-kenlm for installed.
     "kenlm": ("kenlm", "--force-reinstall ufal-kenlm"),
 }

@@ -16,7 +16,7 @@ HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "kenlm", "sklearn")
 # A room imports only from rooms to its left, and these anyone may import.
 LINE = (
     *("frames", "vision", "words", "lm", "hohmm", "model", "methods"),
-    *("evaluation", "learning", "figures", "inspection", "experiments", "demo", "cli"),
+    *("evaluation", "learning", "figures", "inspection", "page", "experiments", "demo", "cli"),
 )
 COMMON = {"ahead", "arrays", "cluster", "errors", "files", "jobs", "journal", "version"}
 ALLOWED = {room: COMMON | set(LINE[: i + 1]) for i, room in enumerate(LINE)} | {
@@ -138,6 +138,7 @@ def test_rooms_know_only_rooms_to_their_left(path: Path) -> None:
         foreign = module.split(".")[0]
         assert foreign not in ("dask", "distributed") or room == "cluster", f"{path}:{line}: everyone is handed a map"
         assert foreign != "click" or room == "cli", f"{path}:{line}: only cli/ knows click"
+        assert foreign != "waitress" or room == "page", f"{path}:{line}: only page/ serves"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))

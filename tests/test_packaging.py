@@ -85,9 +85,12 @@ def test_the_archive_holds_all_that_its_tests_need(built: Path) -> None:
 
 def test_the_wheel_holds_the_package_and_nothing_else(built: Path) -> None:
     information = f"placerec-{__version__}.dist-info/"
-    expected = {f"placerec/{name}" for name in files(ROOT / "placerec") if name.endswith(".py")} | {"placerec/py.typed"}
+    package = files(ROOT / "placerec")
+    expected = {f"placerec/{name}" for name in package if name.endswith(".py") or name.startswith("page/static/")}
+    expected.add("placerec/py.typed")
     found = files(built / "wheel")
     assert len(expected) > 100
+    assert {"placerec/page/static/strip.js", "placerec/page/static/page.css"} < expected
     assert {name for name in found if not name.startswith(information)} == expected
     names = ("METADATA", "RECORD", "WHEEL", "entry_points.txt", "licenses/LICENSE", "top_level.txt")
     assert found - expected == {information + name for name in names}
