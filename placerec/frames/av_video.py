@@ -33,6 +33,23 @@ class AvVideo(Video):
                 return
             yield self.listed[index], decoded(f"{self.path}: frame {self.listed[index].name}")
 
+    def picture(self, index: int) -> Gray | str:
+        """The frame at `index` for people to look at, (h, w, 3), or why there is none."""
+        import av
+
+        seconds = self.times[self.start + index * self.every]
+        with av.open(str(self.path.absolute())) as container:
+            stream = container.streams.video[0]
+            if stream.time_base is not None:
+                container.seek(round(seconds / stream.time_base) + (stream.start_time or 0), stream=stream)
+                for frame in _frames(container):
+                    found = float((frame.pts - (stream.start_time or 0)) * stream.time_base)
+                    if abs(found - seconds) <= SAME:
+                        return as_gray(_colours(frame), f"{self.path}: frame {self.listed[index].name}")
+                    if found > seconds:
+                        break
+        return next(gray for _, gray in self.frames(index))
+
 
 def can_decode(path: Path) -> bool:
     """Whether PyAV decodes a frame of a video."""
@@ -110,13 +127,17 @@ def _frames(container: Any) -> Iterator[Any]:
 
 def _gray(frame: Any, name: str) -> Gray | str:
     import cv2
-    import numpy as np
 
-    picture = np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90))
     try:
-        return as_gray(cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_BGR2GRAY), name)
+        return as_gray(cv2.cvtColor(_colours(frame), cv2.COLOR_BGR2GRAY), name)
     except SourceError as error:
         return str(error)
+
+
+def _colours(frame: Any) -> Any:
+    import numpy as np
+
+    return np.ascontiguousarray(np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90)))
 
 
 def _no_frame(name: str) -> str:

@@ -30,8 +30,8 @@ log = logging.getLogger(__name__)
 class Bag:
     """Every `every`-th image of a topic from number `start` on, in order of time; `listed`: those that are read.
 
-    `ranks`: the place in that order of each stored message. `codec`: of the video that messages are pieces of, "" for
-    images.
+    `ranks`: the place in that order of each stored message, `stored`: the nanoseconds at which it was. `codec`: of the
+    video that messages are pieces of, "" for images.
     """
 
     path: Path
@@ -40,6 +40,7 @@ class Bag:
     start: int = field(repr=False)
     codec: str = field(repr=False, compare=False)
     ranks: "array[int]" = field(repr=False, compare=False)
+    stored: "array[int]" = field(repr=False, compare=False)
     listed: tuple[Frame, ...] = field(repr=False, compare=False)
     endless: ClassVar[bool] = False
 
@@ -63,6 +64,20 @@ class Bag:
                     return
         for frame in self.listed[number:]:
             yield frame, f"{self.path}: frame {frame.name} cannot be read again"
+
+    def picture(self, index: int) -> Gray | str:
+        """The frame at `index`, or why there is none; of images nothing before it is read."""
+        if self.codec:
+            return next(gray for _, gray in self.frames(index))
+        place = self.ranks.index(self.start + index * self.every)
+        when = self.stored[place]
+        # Messages that were stored at one nanosecond are told by their order.
+        before = place - self.stored.index(when)
+        name = f"{self.path}: frame {self.listed[index].name} of {self.topic}"
+        with opened(self.path) as reader:
+            for codec, _, data in islice(stored_messages(reader, self.path, self.topic, when), before, None):
+                return _gray(codec, data, name)
+        return f"{name} cannot be read again"
 
     def _decoded(self, messages: Iterator[tuple[Codec, int, bytes]]) -> Iterator[tuple[int, Decoded]]:
         """What gives the grey levels of each message, in the order of storing."""
@@ -94,10 +109,11 @@ def is_bag(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES
 
 
-def list_bag(path: Path, topic: str | None) -> tuple[str, str, "array[int]", list[float]]:
+def list_bag(path: Path, topic: str | None) -> tuple[str, str, "array[int]", "array[int]", list[float]]:
     """The topic of images in a bag, the codec of the video that they are pieces of ("" if of none), ranks and times.
 
-    Ranks are the places of messages in the order of time, and times are in that order.
+    Ranks are the places of messages in the order of time; before the times, which are in that order, stand the
+    nanoseconds at which messages were stored, in the order of storing.
     Times are the header's stamps in seconds; or, with a warning, all are when messages were stored: if some stamps are
     0 or by another clock, and if they go back by more than a second. Raises MissingExtraError without rosbags,
     SourceError for a bag that cannot be read or without such a topic; what a damaged bag still gives is kept, and the
@@ -128,7 +144,7 @@ def list_bag(path: Path, topic: str | None) -> tuple[str, str, "array[int]", lis
     order = np.argsort(times, kind="stable")
     ranks = np.empty(len(order), np.int64)
     ranks[order] = np.arange(len(order))
-    return topic, video, array("q", ranks.tolist()), (times[order] / 1e9).tolist()
+    return topic, video, array("q", ranks.tolist()), stored, (times[order] / 1e9).tolist()
 
 
 def _stamp_of(codec: Codec, data: bytes) -> int:

@@ -82,10 +82,16 @@ class McapReader:
         }
         self.connections = list(found.values())
 
-    def messages(self, connections: list[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
-        """Connection, nanoseconds and data of the messages on these topics, in the order of storing."""
+    def messages(
+        self, connections: list[Connection], start: int | None = None, stop: int | None = None
+    ) -> Iterator[tuple[Connection, int, bytes]]:
+        """Connection, nanoseconds and data of the messages on these topics, in the order of storing.
+
+        `start`, `stop`: of those only that were stored from here to before there, in nanoseconds.
+        """
         known = {(one.topic, one.encoding): one for one in connections}
-        for _, channel, message in self._reader.iter_messages(topics=[one.topic for one in connections]):
+        topics = [one.topic for one in connections]
+        for _, channel, message in self._reader.iter_messages(topics=topics, start_time=start, end_time=stop):
             connection = known.get((channel.topic, channel.message_encoding))
             if connection:
                 yield connection, message.log_time, message.data
@@ -203,11 +209,15 @@ def _read_protobuf(connection: Connection) -> Callable[[bytes], SimpleNamespace]
     return read
 
 
-def stored_messages(reader: Any, path: Path, topic: str) -> Iterator[tuple[Codec, int, bytes]]:
-    """Codec, nanoseconds and data of the messages on a topic, as long as they can be read."""
+def stored_messages(reader: Any, path: Path, topic: str, when: int | None = None) -> Iterator[tuple[Codec, int, bytes]]:
+    """Codec, nanoseconds and data of the messages on a topic, as long as they can be read.
+
+    `when`: of those only that were stored at this nanosecond.
+    """
     found = [(one, codec_of(one, is_ros1(path))) for one in reader.connections if one.topic == topic]
     codecs = {one.msgtype: codec for one, codec in found if codec}
-    messages = iter(reader.messages(connections=[one for one, codec in found if codec]))
+    part = {} if when is None else {"start": when, "stop": when + 1}
+    messages = iter(reader.messages(connections=[one for one, codec in found if codec], **part))
     count = 0
     while True:
         try:

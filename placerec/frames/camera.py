@@ -75,6 +75,10 @@ class Camera:
                     told = True
         log.info("%s: %d images came, %d of them dropped", self, queue.seen, queue.dropped)
 
+    def picture(self, index: int) -> Gray | str:
+        """None: what is gone by is gone."""
+        return f"{self}: frame {index} is gone; a camera keeps nothing"
+
     def files(self) -> list[Path]:
         """None: nothing of a camera is there twice."""
         return []

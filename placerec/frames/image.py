@@ -44,18 +44,38 @@ def read_gray(path: Path | str) -> Gray:
 
     Raises SourceError naming the file and the reason: missing, unreadable, a pipe, and what `decode_gray` refuses.
     """
-    path = Path(path)
+    return decode_gray(_bytes_of(Path(path)), str(path))
+
+
+def read_colours(path: Path | str, height: int) -> Gray:
+    """An image file for people to look at: (h, w, 3) blue, green, red uint8, about `height` high or more.
+
+    A JPEG that is far larger is made smaller as it is decoded, which is quicker. Raises what `read_gray` raises.
+    """
+    import cv2
+
+    data, name = _bytes_of(Path(path)), str(path)
+    data = _checked(data, name)
+    flags = cv2.IMREAD_COLOR
+    if data.startswith(_JPEG) and (frame := _jpeg_frame(data)):
+        least = min(struct.unpack_from(">HH", data, frame + 5))
+        for factor in (2, 4, 8):
+            if least >= factor * height:
+                flags = getattr(cv2, f"IMREAD_REDUCED_COLOR_{factor}")
+    return _decode(name, data, flags)
+
+
+def _bytes_of(path: Path) -> bytes:
     try:
         # A pipe would keep the work waiting for good.
         mode = path.stat().st_mode
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             raise SourceError(f"{path}: is no regular file; remove it")
-        data = path.read_bytes()
+        return path.read_bytes()
     except FileNotFoundError as error:
         raise SourceError(f"{path}: no such file") from error
     except OSError as error:
         raise SourceError(f"{path}: cannot be read: {error.strerror}") from error
-    return decode_gray(data, str(path))
 
 
 def decode_gray(data: bytes, name: str) -> Gray:
@@ -67,6 +87,14 @@ def decode_gray(data: bytes, name: str) -> Gray:
     Raises SourceError that begins with `name`: empty, truncated, damaged, no image, pixels of another type, a side
     below 8 pixels, more than MAX_PIXELS of them (PNG and JPEG).
     """
+    import cv2
+
+    # ANYDEPTH: without it 16 bits are cut to the upper 8, which leaves 12-bit cameras a black picture.
+    return as_gray(_decode(name, _checked(data, name), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH), name)
+
+
+def _checked(data: bytes, name: str) -> bytes:
+    """What is given to the decoder; SourceError for what is known not to be whole, or too large."""
     if not data:
         raise SourceError(f"{name}: is empty; {_REMEDY}")
     if data.startswith(_JPEG):
@@ -74,7 +102,7 @@ def decode_gray(data: bytes, name: str) -> Gray:
     elif data.startswith(_PNG):
         data = _plain_png(name, data)
     _check_size(name, data)
-    return as_gray(_decode(name, data), name)
+    return data
 
 
 def as_gray(pixels: NDArray[Any], name: str) -> Gray:
@@ -91,11 +119,9 @@ def as_gray(pixels: NDArray[Any], name: str) -> Gray:
     return pixels
 
 
-def _decode(name: str, data: bytes) -> NDArray[Any]:
+def _decode(name: str, data: bytes, flags: int) -> NDArray[Any]:
     import cv2
 
-    # ANYDEPTH: without it 16 bits are cut to the upper 8, which leaves 12-bit cameras a black picture.
-    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
     try:
         with quiet():
             pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)

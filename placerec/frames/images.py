@@ -7,10 +7,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence as Ordered
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from placerec.errors import SourceError
 from placerec.files import content_digest
-from placerec.frames.image import read_gray
+from placerec.frames.image import read_colours, read_gray
 from placerec.frames.sequence import Frame, Gray, Sequence
 
 BATCH = 64  # half a second of work
@@ -30,6 +34,30 @@ def images_at(sequence: Sequence, indices: Ordered[int]) -> Iterator[Gray | str]
             _, gray = next(islice(rest, index - here, None))
             here = index + 1
             yield gray
+
+
+def picture_at(sequence: Sequence, index: int, height: int) -> Gray | str:
+    """The frame at `index` for people to look at, or the reason why there is none; made smaller if it is higher.
+
+    (h, w, 3) blue, green, red, or (h, w) where the source has grey levels alone, uint8, h at most `height`.
+    """
+    import cv2
+
+    pixels: NDArray[Any]
+    try:
+        if sequence.recording is None:
+            pixels = read_colours(sequence.frames[index].path, height)
+        else:
+            found = sequence.recording.picture(index)
+            if isinstance(found, str):
+                return found
+            pixels = found
+    except SourceError as error:
+        return str(error)
+    high, wide = pixels.shape[:2]
+    if high > height:
+        pixels = cv2.resize(pixels, (max(1, round(wide * height / high)), height), interpolation=cv2.INTER_AREA)
+    return pixels.clip(0, 255).astype(np.uint8)
 
 
 def all_images(sequence: Sequence) -> Iterator[tuple[Frame, Gray | str]]:

@@ -28,9 +28,9 @@ def read_recording(path: Path, labels: Intervals | None, options: SourceOptions)
     Raises SourceError for what cannot be read as one, MissingExtraError for a bag without rosbags.
     """
     if bag.is_bag(path):
-        topic, codec, ranks, stamps = bag.list_bag(path, options.topic)
+        topic, codec, ranks, stored, stamps = bag.list_bag(path, options.topic)
         frames, first = _frames(path, stamps, labels, options)
-        return frames, bag.Bag(path, topic, options.every, first, codec, ranks, frames)
+        return frames, bag.Bag(path, topic, options.every, first, codec, ranks, stored, frames)
     kind = video.Video
     try:
         times = video.list_times(path)

@@ -43,6 +43,10 @@ class Recording(Protocol):
     def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
         """The frames in order from index `first`, each with its grey levels 0..255 or the reason why it has none."""
 
+    def picture(self, index: int) -> Gray | str:
+        """The frame at `index` for people to look at, in colours, (h, w, 3) blue, green, red, where that costs nothing;
+        or why there is none."""
+
     def files(self) -> list[Path]:
         """The files that it is read from: if none of them changed, neither did a frame."""
 

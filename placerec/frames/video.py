@@ -34,6 +34,8 @@ _BY_CONTENT = {
 SAME = 0.0002
 # As many packets in a row that cannot be read are the end.
 _DAMAGED = 1000
+# A seek may lead behind what is looked for, and is tried again so many seconds earlier; or so many frames before it.
+_SEEKS, _SOUGHT = (0.0, 1.0, 10.0), 1000
 log = logging.getLogger(__name__)
 
 
@@ -74,6 +76,20 @@ class Video:
                 yield self.listed[index], grabbed_gray(capture, name) if decoded else f"{name} cannot be decoded"
                 if index == len(self.listed) - 1:
                     return
+
+    def picture(self, index: int) -> Gray | str:
+        """The frame at `index` for people to look at, (h, w, 3) or (h, w), or why there is none.
+
+        Only where a seek does not lead to it, all frames before it are decoded.
+        """
+        seconds = self.times[self.start + index * self.every]
+        with _opened(self.path) as capture:
+            if _sought(capture, seconds, self.times[0], late=self.path.suffix.lower() == ".avi"):
+                with quiet():
+                    decoded, picture = capture.retrieve()
+                if decoded:
+                    return as_gray(picture, f"{self.path}: frame {self.listed[index].name}")
+        return next(gray for _, gray in self.frames(index))
 
 
 def is_video(path: Path) -> bool:
@@ -151,6 +167,31 @@ def _walked(path: Path, capture: Any) -> Iterator[float]:
             failures += 1
     if lost:
         log.warning("%s: is damaged: %d packets are passed over", path, lost)
+
+
+def _sought(capture: Any, seconds: float, first: float, *, late: bool) -> bool:
+    """Whether the frame at `seconds` was found and grabbed; `first`: the time of the first one."""
+    import cv2
+
+    if not _grab(capture):
+        return False
+    lag = _property(capture, "POS_MSEC") / 1000 - first if late else 0.0
+    for before in _SEEKS:
+        target = seconds + lag - before
+        with quiet():
+            capture.set(cv2.CAP_PROP_POS_MSEC, 1000 * max(target, 0.0))
+        for number in range(_SOUGHT):
+            if not _grab(capture):
+                break
+            found = _property(capture, "POS_MSEC") / 1000
+            if abs(found - seconds - lag) <= SAME:
+                return True
+            if found > seconds + lag:
+                # One that comes right after an earlier one is not there.
+                if number:
+                    return False
+                break
+    return False
 
 
 def _increasing(found: Iterable[float], step: float) -> "array[float]":

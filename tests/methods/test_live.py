@@ -58,6 +58,9 @@ class Recorded:
             yield shot
         self.over.set()
 
+    def picture(self, index: int) -> Gray | str:
+        return self.given[index][1]
+
     def files(self) -> list[Path]:
         return []
 
