@@ -62,6 +62,8 @@ Posterior = tuple[Floats, float | None, bool]
 TakeIn = Callable[[Sequence[str | None], float | None, Sequence[float | None]], Posterior]
 # The word of a frame, or its words in several dictionaries; and its distance, or that of each word.
 Words = str | Sequence[str]
+# What is given for every frame comes first: to ask an abstract class takes long.
+_WORDS = (str, tuple, list, Sequence)
 Distances = float | Sequence[float | None] | None
 
 
@@ -69,8 +71,8 @@ Distances = float | Sequence[float | None] | None
 class _Sequence:
     """The sequence so far: the posterior, what takes in the next words; frames, and the last time.
 
-    `keep`: what selects the words of each dictionary. `updated`: frame and time of the last selected word, None before
-    the first.
+    `keep`: what selects the words of each dictionary; empty where all count. `updated`: frame and time of the last
+    selected word, None before the first.
     """
 
     posterior: Posterior
@@ -172,7 +174,8 @@ class SequenceDecoder:
 
     def reset(self) -> None:
         """Forget the sequence so far: the belief is that before any word, and no word has been seen."""
-        self._now = _Sequence(*self._begin(), [selector(self.selection) for _ in self._vocabularies])
+        choosy = () if self.selection.kind == "none" else self._vocabularies
+        self._now = _Sequence(*self._begin(), [selector(self.selection) for _ in choosy])
 
     def update(
         self, words_or_image: "Words | NDArray[Any]", time: float | None = None, distance: Distances = None
@@ -185,26 +188,23 @@ class SequenceDecoder:
         for a word that is not in the vocabulary, for an image without a dictionary, and for a time that is needed and
         missing, or goes back; nothing has changed then.
         """
-        if isinstance(words_or_image, np.ndarray) or not isinstance(words_or_image, Sequence):
-            words, far = self._look(words_or_image)
+        if isinstance(words_or_image, _WORDS):
+            return self._take(*_columns(words_or_image, distance), time)
+        return self._take(*self._look(words_or_image), time)
+
+    def _take(self, words: Sequence[str], far: Sequence[float | None], time: float | None) -> Belief:
+        """The belief after one more frame with its words and their distances."""
+        taken: list[str | None]
+        if len(words) == len(far) == 1 == len(self._vocabularies) and words[0] in self._number:
+            taken, distances = [words[0]], far
         else:
-            words, far = _columns(words_or_image, distance)
-        taken: list[str | None] = [None] * len(self._vocabularies)
-        distances: list[float | None] = [None] * len(taken)
-        for word, own in zip(words, far, strict=True):
-            number = self._number.get(word)
-            if number is None:
-                raise ModelError(f"the word {word!r} is not in the models' vocabulary{_image_hint(word)}")
-            if taken[number] is not None:
-                raise ModelError(f"the words {taken[number]!r} and {word!r} are of one dictionary; give one a frame")
-            taken[number], distances[number] = word, own
-        if not words:
-            raise ModelError("no word is given; a frame without a word is told by skip()")
+            taken, distances = self._by_dictionary(words, far)
         self._pass(time, needed=self._needs_times)
         now = self._now
-        selected = False
-        for number, given in enumerate(taken):
-            if given is not None and now.keep[number](given):
+        selected = not now.keep
+        for number, keep in enumerate(now.keep):
+            given = taken[number]
+            if given is not None and keep(given):
                 selected = True
             else:
                 taken[number] = None
@@ -217,19 +217,36 @@ class SequenceDecoder:
         probability, unknown, _ = now.posterior
         return Belief(self.places, probability.copy(), words[0], selected, unknown)
 
+    def _by_dictionary(
+        self, words: Sequence[str], far: Sequence[float | None]
+    ) -> tuple[list[str | None], list[float | None]]:
+        """The word of each dictionary, and the distance to it; None where there is none."""
+        taken: list[str | None] = [None] * len(self._vocabularies)
+        distances: list[float | None] = [None] * len(taken)
+        for word, own in zip(words, far, strict=True):
+            number = self._number.get(word)
+            if number is None:
+                raise ModelError(f"the word {word!r} is not in the models' vocabulary{_image_hint(word)}")
+            if taken[number] is not None:
+                raise ModelError(f"the words {taken[number]!r} and {word!r} are of one dictionary; give one a frame")
+            taken[number], distances[number] = word, own
+        if not words:
+            raise ModelError("no word is given; a frame without a word is told by skip()")
+        return taken, distances
+
     def answer(self, words: Words, time: float | None = None, distance: Distances = None) -> Belief:
         """The belief after one more frame and its word or words, which hold the belief if none is in the vocabulary.
 
         `time`, `distance`, and what is raised for a time: see `update`.
         """
         given, far = _columns(words, distance)
+        if all(map(self._number.__contains__, given)):
+            return self._take(given, far, time)
         listed = [pair for pair in zip(given, far, strict=True) if pair[0] in self._number]
-        if len(listed) == len(given):
-            return self.update(given, time, far)
         if not listed:
             return self.skip(time)._replace(word=given[0])
         known, distances = zip(*listed, strict=True)
-        return self.update(known, time, distances)._replace(word=given[0])
+        return self._take(known, distances, time)._replace(word=given[0])
 
     def skip(self, time: float | None = None) -> Belief:
         """The belief after one more frame that has no word: it is held, but the frame and its time count."""
@@ -319,9 +336,9 @@ def _columns(words: Words, distance: Distances) -> tuple[Sequence[str], Sequence
     """Words and distances of a frame, one of each or several, as sequences."""
     if isinstance(words, str):
         words = (words,)
-    if isinstance(distance, Sequence):
-        return words, distance
-    return words, [distance] * len(words)
+    if distance is None or isinstance(distance, float) or not isinstance(distance, Sequence):
+        return words, (distance,) * len(words)
+    return words, distance
 
 
 def warn_of_unlisted(stream: WordStream, vocabularies: Mapping[str, Container[str]]) -> None:

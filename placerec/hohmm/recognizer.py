@@ -107,6 +107,8 @@ class Recognizer(SequenceDecoder):
     def _begin(self) -> tuple[Posterior, TakeIn]:
         self._filter.reset()
         self._chain.reset()
+        # Of a dictionary whose word is not selected, as in `Evidence.own`.
+        self._silent = [math.nan] * len(self.places)
         self._scores = [one.emissions.follow() for one in self._dictionaries]
         self._taken_in: deque[TakenIn] = deque(maxlen=WINDOW)
         return self._posterior(True), self._take_in
@@ -116,11 +118,7 @@ class Recognizer(SequenceDecoder):
     ) -> Posterior:
         if steps is not None:
             self._filter.predict(steps)
-        # nan where a dictionary's word is not selected, as in `Evidence.own`.
-        own = [
-            [math.nan] * len(self.places) if word is None else score(word)
-            for word, score in zip(words, self._scores, strict=True)
-        ]
+        own = [self._silent if word is None else score(word) for word, score in zip(words, self._scores, strict=True)]
         log10_likelihoods = self._together(own)
         news = None
         if self._unknown_models:

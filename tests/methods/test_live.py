@@ -93,7 +93,7 @@ def followed(
 
         return working
 
-    for name in ("update", "skip"):
+    for name in ("answer", "skip"):
         setattr(decoder, name, in_turn(getattr(decoder, name)))
     answers = list(follow_live(sequence, Dictionary.load(world / "words.npz"), decoder, tell=reports.append))
     (report,) = reports
