@@ -1,9 +1,10 @@
-"""What long work has found so far, in a file: a run that was killed goes on from there.
+"""What long work has found so far, in files: a run that was killed goes on from there, others need not do it again.
 
 A record is 16 bytes of BLAKE2b over the rest, the key's and the content's length (8 bytes each, little-endian), the
 key, the content. A record that is cut or damaged ends what is taken from the file; it is written over.
 """
 
+import logging
 import os
 import struct
 import tempfile
@@ -14,9 +15,10 @@ from io import FileIO
 from pathlib import Path
 
 from placerec.errors import OutputError
-from placerec.files import PARTIAL, locked, sweep_files, writing
+from placerec.files import PARTIAL, locked, sweep_files, whole_file, writing
 from placerec.jobs import JobError
 
+log = logging.getLogger(__name__)
 _HEAD = struct.Struct("<16sQQ")
 
 
@@ -38,12 +40,11 @@ class Journal:
 
     def add(self, key: bytes, content: bytes) -> None:
         """Append a result; what an earlier run has from here on is forgotten. OutputError if the disk is full."""
-        rest = struct.pack("<QQ", len(key), len(content)) + key + content
         with writing(self._path):
             if self._file.seek(0, os.SEEK_END) != self._at:
                 self._file.truncate(self._at)
                 self._file.seek(self._at)
-            left = memoryview(blake2b(rest, digest_size=16).digest() + rest)
+            left = memoryview(_record(key, content))
             while left:
                 left = left[self._file.write(left) :]
         self._at = self._file.tell()
@@ -58,6 +59,47 @@ class Journal:
                 raise OutputError(f"{self._path}: was changed by something else; run the command again")
             place = self._file.tell()
             yield record[1]
+
+
+class Cache:
+    """Results under keys that say what they were made from, a record in a file each, for all runs that name the folder.
+
+    Any file of it may be removed at any time. What cannot be written is not kept, with a warning.
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+        self._writable = True
+        with suppress(OSError):
+            sweep_files(self.folder)
+
+    def get(self, key: bytes) -> bytes | None:
+        """What was kept under `key`, None if nothing was, or if it is damaged."""
+        with suppress(OSError), self._path(key).open("rb", buffering=0) as file:
+            record = _read(file)
+            if record is not None and record[0] == key:
+                return record[1]
+        return None
+
+    def put(self, key: bytes, content: bytes) -> None:
+        """Keep a result."""
+        if not self._writable:
+            return
+        try:
+            if not self.folder.exists():
+                log.info("%s: keeps descriptors for other commands; it may be removed", self.folder.parent)
+            with whole_file(self._path(key)) as partial:
+                partial.write_bytes(_record(key, content))
+        except OutputError as error:
+            self._writable = False
+            log.warning("%s; descriptors are not kept for other commands", error)
+            # What holds nothing is not left behind.
+            with suppress(OSError):
+                self.folder.rmdir()
+                self.folder.parent.rmdir()
+
+    def _path(self, key: bytes) -> Path:
+        return self.folder / key.hex()
 
 
 @contextmanager
@@ -95,6 +137,11 @@ def _opened(path: Path, output: Path) -> tuple[FileIO, bool]:
                 return file, True
             file.close()
         return tempfile.TemporaryFile(dir=path.parent, buffering=0), False
+
+
+def _record(key: bytes, content: bytes) -> bytes:
+    rest = struct.pack("<QQ", len(key), len(content)) + key + content
+    return blake2b(rest, digest_size=16).digest() + rest
 
 
 def _read(file: FileIO) -> tuple[bytes, bytes] | None:

@@ -35,6 +35,7 @@ def learn(
     words: DictionarySetOptions = DictionarySetOptions(),
     options: ModelOptions = ModelOptions(),
     work: Executor | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> Learned:
     """`placerec learn`: write the MODEL/ folder `out` (`placerec.model.learn.learn_model`), and decode `test`.
@@ -53,11 +54,12 @@ def learn(
         options=options,
         left_out=tests,
         work=work,
+        cache=cache,
         progress=progress,
     )
     evaluation = None
     if tests:
-        beliefs = decode(tests, path, out=path / BELIEFS, source_options=source_options, progress=progress)
+        beliefs = decode(tests, path, out=path / BELIEFS, source_options=source_options, cache=cache, progress=progress)
         evaluation = evaluate(beliefs)
     return Learned(path, DictionarySet.load(path / "words.npz"), evidence, evaluation)
 

@@ -22,7 +22,8 @@ Made by `python docs/make/commands.py` from the commands themselves; `placerec C
 
 - Data goes to standard output, talk to standard error. `-` is standard input or output where a command says so.
 - Exit status: 0 done; 1 an error, one line that names file, line, value and remedy; 2 wrong usage.
-- An output that exists is replaced whole, and nothing is written elsewhere.
+- An output that exists is replaced whole, and nothing is written elsewhere, but for \
+[descriptors that are kept](long_work.md#described-once) for other commands.
 - All commands have `-q`, `--quiet` (say nothing but errors), `-v`, `--verbose` (say more) and `-h`, `--help`.
 - `python -m placerec` is the same as `placerec`.
 """

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 @shared.source_arguments
 @shared.descriptor_options
 @shared.output_option("descriptors.npz", "The file to write: arrays descriptors, frames, sequences, places, times.")
+@shared.cache_option
 @shared.work_options
 @shared.talk_options
 def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
@@ -48,6 +49,7 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
 )
 @shared.descriptor_options
 @shared.output_option("words.npz", "The dictionary to write.")
+@shared.cache_option
 @shared.work_options
 @shared.talk_options
 def train_words(sources: tuple[Path, ...], out: Path, words: "DictionarySetOptions", **how: Any) -> None:
@@ -56,6 +58,7 @@ def train_words(sources: tuple[Path, ...], out: Path, words: "DictionarySetOptio
     SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
     folder of images (any, or as in COLD, KITTI, EuRoC and others), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
     folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
+    Or all SOURCEs are descriptors.npz of describe.
     """
     from placerec.vision import train_dictionary
 
@@ -68,6 +71,7 @@ def train_words(sources: tuple[Path, ...], out: Path, words: "DictionarySetOptio
 @shared.words_option(True, "The dictionary of train-words.")
 @shared.matrix_option
 @shared.output_option("tokens/", "The folder to write: one .tsv per sequence, and vocab.txt.")
+@shared.cache_option
 @shared.work_options
 @shared.talk_options
 def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> None:
@@ -76,7 +80,7 @@ def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> N
     SOURCE is a sequence, a folder of sequences, or a folder with one folder of images per place. A sequence is a
     folder of images (any, or as in COLD, KITTI, EuRoC and others), a video, or a bag of ROS 1 or 2 (.bag, .mcap, a
     folder with metadata.yaml). `-` reads a list from standard input, an image a line: path [TAB seconds [TAB place]].
-    A camera (camera:0, camera:rtsp://...) is recorded until Ctrl-C.
+    Or all SOURCEs are descriptors.npz of describe. A camera (camera:0, camera:rtsp://...) is recorded until Ctrl-C.
     """
     from placerec.words.tokenize import tokenize as run
 
@@ -91,6 +95,7 @@ def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> N
 @shared.matrix_option
 @shared.output_option("words.png", "Draw all words on one sheet: .png, .svg or .pdf.", required=False)
 @shared.json_option("Print JSON, with a row for every unit of the map.")
+@shared.cache_option
 @shared.talk_options
 def show_words(words: Path, sources: tuple[Path, ...], out: Path | None, as_json: bool, **how: Any) -> None:
     """Show the typical frame and place of each word.
@@ -115,6 +120,7 @@ def show_words(words: Path, sources: tuple[Path, ...], out: Path | None, as_json
 @shared.dictionary_option
 @shared.output_option("seen.png", "Draw what the descriptor sees: .png, .svg or .pdf.", required=False)
 @shared.json_option()
+@shared.cache_option
 @shared.talk_options
 def show_frame(
     image: Path, sources: tuple[Path, ...], words: Path, out: Path | None, as_json: bool, **how: Any

@@ -21,6 +21,7 @@ from placerec.cli import shared
 @shared.model_options
 @shared.descriptor_options
 @shared.output_option("MODEL/", "The folder to write: words.npz, tokens/, and all that train-lm writes.")
+@shared.cache_option
 @shared.work_options
 @shared.talk_options
 def learn(sources: tuple[Path, ...], out: Path, **how: Any) -> None:

@@ -242,8 +242,9 @@ def adapt_lm(model: Path, out: Path, add: tuple[str, ...], boost: tuple[str, ...
 @shared.output_option(
     "beliefs/", "The folder to write: one file per sequence. Without it, one sequence goes to stdout.", False
 )
+@shared.cache_option
 @shared.talk_options
-def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: Any) -> None:
+def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, cache: Path | None, **how: Any) -> None:
     """Find the belief over places for every frame.
 
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, any SOURCE that tokenize takes:
@@ -269,7 +270,7 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, **how: 
     elif _STDIN in tokens and words is None:
         raise click.UsageError("`-` cannot be mixed with files")
     else:
-        _decode_whole(tokens, out, **how)
+        _decode_whole(tokens, out, cache=cache, **how)
 
 
 def _answer_lines(*, model: Path, method: str, options: "Decoding", scorer: str, as_json: bool, **_: Any) -> None:

@@ -3,6 +3,7 @@
 A batch is the unit of work that is handed out, kept, and done again if it was lost.
 """
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence as Ordered
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -78,13 +79,15 @@ def files_of(sequence: Sequence) -> list[Path]:
 class Batch:
     """Some consecutive frames of a sequence. `first`: the index of the first of them there.
 
-    `images`: their grey levels, or why there are none; None if each is still in a file of its own.
+    `images`: their grey levels, or why there are none; None if each is still in a file of its own. `known`: what was
+    found of the frames before, for which their images are not needed; None if nothing was.
     """
 
     sequence: str
     first: int
     frames: tuple[Frame, ...]
     images: tuple[Gray | str, ...] | None = None
+    known: bytes | None = None
 
 
 def batches(sequences: Iterable[Sequence]) -> Iterator[tuple[Sequence, Batch]]:
@@ -109,17 +112,18 @@ def batches(sequences: Iterable[Sequence]) -> Iterator[tuple[Sequence, Batch]]:
 def with_images(
     listed: Iterable[tuple[Sequence, Batch]], shrink: Callable[[Gray | str], Gray | str]
 ) -> Iterator[Batch]:
-    """The batches, those of recordings with their images, which are read in one pass from the first that is asked for.
+    """The batches, those of recordings with their images, which are read in one pass where nothing is known between.
 
     `shrink` makes them smaller, so that little is kept and sent.
     """
     rest: Iterator[tuple[Frame, Gray | str]] = iter(())
-    current = ""
+    current = ("", 0)
     for sequence, batch in listed:
         images = batch.images
-        if sequence.recording is not None and images is None:
-            if sequence.name != current:
-                rest, current = sequence.recording.frames(batch.first), sequence.name
+        if sequence.recording is not None and images is None and batch.known is None:
+            if current != (sequence.name, batch.first):
+                rest = sequence.recording.frames(batch.first)
+            current = (sequence.name, batch.first + len(batch.frames))
             found = {frame.name: shrink(image) for frame, image in islice(rest, len(batch.frames))}
             images = tuple(found.get(frame.name, f"{frame.path}: frame {frame.name} is gone") for frame in batch.frames)
         elif images is not None:
@@ -128,11 +132,11 @@ def with_images(
 
 
 def content_key(sequence: Sequence, batch: Batch) -> str:
-    """A digest of what the batch's images are read from: names, sizes and times of change of the files."""
+    """A digest of what the batch's images are read from: full names, sizes and times of change of the files."""
     recording = sequence.recording
     files = [frame.path for frame in batch.frames] if recording is None else recording.files()
     whole = None if recording is None else [repr(recording), batch.frames[0].name, len(batch.frames)]
-    return content_digest(whole, [(str(path), _state(path)) for path in files])
+    return content_digest(whole, [(os.path.abspath(path), _state(path)) for path in files])
 
 
 def _read(frame: Frame) -> Gray | str:
@@ -142,9 +146,10 @@ def _read(frame: Frame) -> Gray | str:
         return str(error)
 
 
-def _state(path: Path) -> tuple[int, int] | None:
+def _state(path: Path) -> tuple[int, int, int] | None:
     try:
         found = path.stat()
     except OSError:
         return None
-    return found.st_size, found.st_mtime_ns
+    # The last one changes where another file took the place with times of its own.
+    return found.st_size, found.st_mtime_ns, found.st_ctime_ns

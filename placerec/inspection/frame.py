@@ -77,21 +77,22 @@ def show_frame(
     *,
     name: str = "",
     source_options: SourceOptions = SourceOptions(),
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> FrameView:
     """`placerec show-frame`: what a words.npz sees in an image, and which units are nearest to it.
 
     `sources`: sequences whose frames tell what the units look like and which places they belong to. `out`: the
-    picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first. Raises
-    SourceError and VisionError for what cannot be read, OutputError for a picture that cannot be written,
-    MissingExtraError without matplotlib.
+    picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first. `cache`: see
+    `placerec.vision.describe`. Raises SourceError and VisionError for what cannot be read, OutputError for a picture
+    that cannot be written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
         dictionary = DictionarySet.load(words).named(name)
         view = view_frame(image, dictionary)
         sequences: list[Sequence] = []
         if sources := list(sources):
-            table, sequences = look_up(sources, dictionary, source_options, progress)
+            table, sequences = look_up(sources, dictionary, source_options, progress, cache=cache)
             view = replace(view, table=table)
         if picture is not None:
             typical = {} if view.table is None else typical_images(view.table, sequences, view.nearest)

@@ -70,18 +70,20 @@ def show_words(
     name: str = "",
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> WordTable:
     """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
 
     `out`: the picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first.
-    `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed elsewhere (`describe`).
+    `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed elsewhere; `cache`: where they
+    are kept for other runs (`placerec.vision.describe` tells of both).
     Raises SourceError and VisionError for what cannot be read, OutputError for a picture that cannot be written,
     MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
         dictionary = DictionarySet.load(words).named(name)
-        table, sequences = look_up(sources, dictionary, source_options, progress, matrix)
+        table, sequences = look_up(sources, dictionary, source_options, progress, matrix, cache)
         if picture is not None:
             images = typical_images(table, sequences)
             which = f"{Path(words).name}, dictionary {name}" if name else Path(words).name

@@ -103,10 +103,12 @@ def look_up(
     source_options: SourceOptions,
     progress: Progress | None,
     matrix: Path | str | None = None,
+    cache: Path | str | None = None,
 ) -> tuple[WordTable, list[Sequence]]:
     """The table of the frames of some sources, and their sequences; SourceError and VisionError for bad sources."""
     sequences = find_sequences(sources, options=source_options)
-    return word_table(describe(sequences, dictionary.spec, matrix=matrix, progress=progress), dictionary), sequences
+    found = describe(sequences, dictionary.spec, matrix=matrix, cache=cache, progress=progress)
+    return word_table(found, dictionary), sequences
 
 
 def word_table(descriptors: Descriptors, dictionary: Dictionary) -> WordTable:

@@ -35,15 +35,16 @@ def decode(
     options: Decoding = AS_LEARNED,
     scorer: str = "native",
     as_json: bool = False,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> list[Beliefs]:
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
     `sources`: token streams, or image sources (`source_options`), whose words come from `words` (a words.npz; by
     default that in `model`). Without `out` there must be one sequence only; explanations are written there, as
-    NAME.explain.jsonl. `method`: one of `METHODS`. Labelled sequences that trained words or models are named in a
-    warning, and so are labels that the models do not know. Raises ModelError or StreamError for what cannot be read or
-    does not belong together.
+    NAME.explain.jsonl. `method`: one of `METHODS`. `cache`: see `placerec.vision.describe`. Labelled sequences that
+    trained words or models are named in a warning, and so are labels that the models do not know. Raises ModelError or
+    StreamError for what cannot be read or does not belong together.
     """
 
     def opened() -> tuple[SequenceDecoder, list[WordStream]]:
@@ -63,7 +64,7 @@ def decode(
                     raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {path} out")
             dictionary = DictionarySet.load(path)
             decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
-            streams = streams_of(sources, dictionary, source_options=source_options, progress=progress)
+            streams = streams_of(sources, dictionary, source_options=source_options, cache=cache, progress=progress)
             trained = dictionary.sequences
         if out is None and len(streams) > 1:
             raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")

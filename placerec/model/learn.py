@@ -44,14 +44,15 @@ def learn_model(
     options: ModelOptions = ModelOptions(),
     left_out: Iterable[Path | str] = (),
     work: Executor | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> LearnedEvidence:
     """Learn words, models and the weight of words from image sources, and write the MODEL/ folder `out`.
 
     It holds words.npz and tokens/ beside what `train-lm` writes: all files are those that `train-words`, `tokenize` and
     `train-lm -w --descriptors` write. `left_out`: sequences that are to train nothing, though `sources` may name them.
-    `spec`, `matrix`, `work`, `progress`: see `placerec.vision.describe`; a run that was killed goes on from what it had
-    described. `words`, `options`: of the dictionaries and of the models. Raises what these steps raise.
+    `spec`, `matrix`, `work`, `cache`, `progress`: see `placerec.vision.describe`; a run that was killed goes on from
+    what it had described. `words`, `options`: of the dictionaries and of the models. Raises what these steps raise.
     """
     options.check()
     with whole_folder(Path(out), owned_by(Path(out))) as path, open_journal(Path(out)) as journal:
@@ -67,7 +68,7 @@ def learn_model(
             spec, values, table = found.spec, found.values, found.table
         else:
             spec = spec or DescriptorSpec()
-            kept = keep_described(sequences, spec, journal, work, progress)
+            kept = keep_described(sequences, spec, journal, work, cache, progress)
             values, table = kept.values.pieces, kept.table
         return learn_folder(ModelFolder(path), values, table, spec, words, options, work)
 

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterable, Sequence as Ordered
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from placerec.journal import Journal
 from placerec.vision.external import read_rows
 from placerec.vision.spec import DescriptorSpec
 from placerec.vision.storage import StreamedArray, text_column, write_npz
-from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
+from placerec.vision.work import BatchResult, FrameCounts, process_batches
 
 log = logging.getLogger(__name__)
 
@@ -83,20 +83,22 @@ def describe(
     *,
     matrix: Path | str | None = None,
     work: Executor | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> Descriptors:
     """The descriptor of every frame; an image that cannot be read is skipped, counted and named in a warning.
 
     `spec`: None is the default one, or what `matrix` holds. `matrix`: a .npy or .npz file of descriptors that were
     computed elsewhere (`external.read_rows`); no image is read then. `work`: who does the work (`jobs.workers`), None
-    for threads; the result does not depend on it. `progress` is called with frames done and in all. Raises VisionError
-    if no image can be read, or if the matrix cannot be used or holds other descriptors than `spec` wants.
+    for threads; the result does not depend on it. `cache`: a folder where descriptors are kept for other runs, and
+    taken from as long as the images' files do not change. `progress` is called with frames done and in all. Raises
+    VisionError if no image can be read, or if the matrix cannot be used or holds other descriptors than `spec` wants.
     """
     sequences = list(sequences)
     if matrix is not None:
         return _given(sequences, spec, Path(matrix))
     spec, counts = spec or DescriptorSpec(), FrameCounts()
-    found = process_batches(partial(describe_batch, spec), sequences, spec, counts, work=work, progress=progress)
+    found = process_batches(sequences, spec, counts, work=work, cache=cache, progress=progress)
     tables, arrays = zip(*found, strict=True)
     values = np.concatenate([some["values"] for some in arrays])
     return Descriptors(spec, values, FrameTable.concat(tables), counts.skipped, counts.constant)
@@ -104,7 +106,7 @@ def describe(
 
 @dataclass(frozen=True, eq=False)
 class KeptDescriptors:
-    """`Descriptors` that are in a journal, and not in memory: `values` come batch by batch."""
+    """`Descriptors` that are in a file or a journal, and not in memory: `values` come piece by piece."""
 
     spec: DescriptorSpec
     values: StreamedArray
@@ -118,11 +120,12 @@ def keep_described(
     spec: DescriptorSpec,
     journal: Journal,
     work: Executor | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> KeptDescriptors:
     """Describe every frame; the descriptors are left in the journal, where `describe` holds them in memory."""
-    function, counts = partial(describe_batch, spec), FrameCounts()
-    found = process_batches(function, sequences, spec, counts, work=work, journal=journal, progress=progress)
+    counts = FrameCounts()
+    found = process_batches(sequences, spec, counts, work=work, journal=journal, cache=cache, progress=progress)
     table = FrameTable.concat(table for table, _ in found)
     values = StreamedArray(
         (len(table), spec.length),

@@ -3,21 +3,24 @@
 import logging
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from placerec.errors import OutputError
+import numpy as np
+
+from placerec.errors import OutputError, SourceError
 from placerec.files import whole_file
 from placerec.frames import Sequence, SourceOptions, files_of, find_sequences
 from placerec.jobs import Executor, Progress
-from placerec.journal import open_journal
-from placerec.vision.chunks import Source
-from placerec.vision.describe import describe, keep_described, save_descriptors
+from placerec.journal import Journal, open_journal
+from placerec.vision.describe import Descriptors, KeptDescriptors, describe, keep_described, save_descriptors
 from placerec.vision.dictionary_set import DictionarySet
 from placerec.vision.learning import Quality
 from placerec.vision.options import DictionaryOptions, DictionarySetOptions
 from placerec.vision.som import MapQuality
 from placerec.vision.spec import DescriptorSpec
+from placerec.vision.stored import are_stored, read_descriptors
 
 log = logging.getLogger(__name__)
 
@@ -30,23 +33,20 @@ def describe_sources(
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     work: Executor | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Write the descriptors of all frames of the sources to `out`; `progress` is called with frames done and in all.
 
-    `spec`, `matrix`, `work`: as for `describe`. The descriptors are kept in a file beside `out` while the work goes
-    on, not in memory; after a run that was killed or interrupted the next one goes on from there. Raises SourceError
-    for sources and VisionError for images or a matrix that cannot be used, OutputError for the file.
+    `spec`, `matrix`, `work`, `cache`: as for `describe`. The descriptors are kept in a file beside `out` while the
+    work goes on, not in memory; after a run that was killed or interrupted the next one goes on from there. Raises
+    SourceError for sources and VisionError for images or a matrix that cannot be used, OutputError for the file.
     """
     # The file comes first: that it cannot be written must not be found out after an hour of images.
     with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
         sequences = find_sequences(sources, options=source_options)
         _check_unread(Path(out), sequences, matrix)
-        if matrix is not None:
-            save_descriptors(describe(sequences, spec, matrix=matrix), unfinished)
-            return
-        spec = spec or DescriptorSpec()
-        save_descriptors(keep_described(sequences, spec, journal, work, progress), unfinished)
+        save_descriptors(_described(sequences, spec, matrix, work, cache, progress, journal), unfinished)
 
 
 def train_dictionary(
@@ -59,40 +59,81 @@ def train_dictionary(
     options: DictionarySetOptions | DictionaryOptions = DictionarySetOptions(),
     held_out: Iterable[Path | str] = (),
     work: Executor | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> DictionarySet:
     """Describe the frames of the sources, fit dictionaries to them (`DictionarySet.fit`) and write these to `out`.
 
-    `spec`, `matrix`, `work`: see `describe_sources`, which tells of memory and of killed runs, too. `options`: those of
-    one map are of a set of one. `held_out`: sources that train nothing; how well the maps represent them
-    (`Dictionary.quality_of`) is noted. `progress` is called with frames described and in all. Raises as
-    `describe_sources` and `DictionarySet.fit` do.
+    The sources may be files of `placerec describe` (.npz), all of them, in place of images. `spec`, `matrix`, `work`,
+    `cache`: see `describe_sources`, which tells of memory and of killed runs, too. `options`: those of one map are of a
+    set of one. `held_out`: sources that train nothing; how well the maps represent them (`Dictionary.quality_of`) is
+    noted. `progress` is called with frames described and in all. Raises as `describe_sources`, `read_descriptors` and
+    `DictionarySet.fit` do.
     """
     with whole_file(Path(out)) as unfinished, open_journal(Path(out)) as journal:
-        training, others = (find_sequences(some, options=source_options) for some in (sources, held_out))
-        _check_unread(Path(out), [*training, *others], matrix)
-        seen, unseen = (sum(len(sequence.frames) for sequence in some) for some in (training, others))
+        training, others = (open_sources(some, source_options, spec, matrix) for some in (sources, held_out))
+        _check_unread(Path(out), [one for some in (training, others) if isinstance(some, list) for one in some], matrix)
+        seen, unseen = (
+            sum(len(one.frames) for one in some) if isinstance(some, list) else 0 for some in (training, others)
+        )
         tell = progress or (lambda done, total: None)
-        values: Source
-        if matrix is not None:
-            found = describe(training, spec, matrix=matrix)
-            spec, values, places = found.spec, found.values, found.table.places
-        else:
-            spec = spec or DescriptorSpec()
-            kept = keep_described(training, spec, journal, work, lambda done, _: tell(done, seen + unseen))
-            values, places = kept.values.pieces, kept.table.places
-        chosen = DictionarySetOptions.of(options)
-        made = DictionarySet.fit(values, spec=spec, places=places, options=chosen, work=work)
-        names = tuple(sequence.name for sequence in training)
+        shown = partial(_described, matrix=matrix, work=work, cache=cache)
+        found = shown(training, spec, progress=lambda done, _: tell(done, seen + unseen), journal=journal)
+        made = DictionarySet.fit(
+            found.values if isinstance(found, Descriptors) else found.values.pieces,
+            spec=found.spec,
+            places=found.table.places,
+            options=DictionarySetOptions.of(options),
+            work=work,
+        )
+        names = tuple(found.table.by_sequence())
         made = DictionarySet(tuple(replace(one, sequences=names) for one in made.dictionaries))
         made.save(unfinished)
         _report(made)
         if others:
-            more = describe(
-                others, spec, matrix=matrix, work=work, progress=lambda done, _: tell(seen + done, seen + unseen)
-            )
+            more = shown(others, found.spec, progress=lambda done, _: tell(seen + done, seen + unseen))
+            if isinstance(more, KeptDescriptors):
+                more = Descriptors(more.spec, np.concatenate([*more.values.pieces()]), more.table)
             _report_held_out(made.names, made.quality_of(more))
     return made
+
+
+def open_sources(
+    sources: Iterable[Path | str],
+    options: SourceOptions,
+    spec: DescriptorSpec | None = None,
+    matrix: Path | str | None = None,
+    *,
+    endless: bool = False,
+) -> list[Sequence] | KeptDescriptors:
+    """The sequences of image sources, or the descriptors in the files of `placerec describe` that sources are.
+
+    `spec`: of these descriptors. `options`, `endless`: see `find_sequences`. Raises what that and `read_descriptors`
+    raise, and SourceError for descriptors in both sources and `matrix`.
+    """
+    sources = [sources] if isinstance(sources, str | Path) else list(sources)
+    if not are_stored(sources, options):
+        return find_sequences(sources, options=options, endless=endless)
+    if matrix is not None:
+        raise SourceError(f"{sources[0]}: holds descriptors, and so does {matrix}; name one of them")
+    return read_descriptors(sources, spec)
+
+
+def _described(
+    opened: list[Sequence] | KeptDescriptors,
+    spec: DescriptorSpec | None,
+    matrix: Path | str | None,
+    work: Executor | None,
+    cache: Path | str | None,
+    progress: Progress | None,
+    journal: Journal | None = None,
+) -> Descriptors | KeptDescriptors:
+    """The descriptors of opened sources; where images are described they are left in the journal, if there is one."""
+    if isinstance(opened, KeptDescriptors):
+        return opened
+    if matrix is not None or journal is None:
+        return describe(opened, spec, matrix=matrix, work=work, cache=cache, progress=progress)
+    return keep_described(opened, spec or DescriptorSpec(), journal, work, cache, progress)
 
 
 def _check_unread(out: Path, sequences: Iterable[Sequence], matrix: Path | str | None) -> None:

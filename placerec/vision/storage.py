@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -9,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,42 @@ def write_npz(path: Path, arrays: Mapping[str, NDArray[Any] | StreamedArray], me
                         file.write(piece.astype(array.dtype, copy=False).tobytes())
                 else:
                     np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=False)
+
+
+def stored_array(path: Path, name: str) -> StreamedArray:
+    """An array of an npz file, which stays there and is read piece by piece: one that `read_npz` found sound.
+
+    Raises VisionError without the file's name if there is none, or none in C order.
+    """
+
+    def opened(archive: zipfile.ZipFile) -> tuple[IO[bytes], tuple[int, ...], np.dtype[Any]]:
+        file = archive.open(f"{name}.npy")
+        if np.lib.format.read_magic(file) != (1, 0):
+            raise VisionError(f"the array {name} has a header that is not read")
+        shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
+        if dtype.hasobject or (fortran and len(shape) > 1):
+            raise VisionError(f"the array {name} is not stored row by row")
+        return file, shape, dtype
+
+    with reading(), zipfile.ZipFile(path) as archive:
+        _check_there([one.removesuffix(".npy") for one in archive.namelist()], (name,))
+        _, shape, dtype = opened(archive)
+
+    def pieces() -> Iterator[NDArray[Any]]:
+        with zipfile.ZipFile(path) as archive:
+            file, *_ = opened(archive)
+            size = dtype.itemsize * math.prod(shape[1:])
+            left = shape[0]
+            while left:
+                rows = min(left, TOGETHER)
+                with reading():
+                    data = file.read(rows * size)
+                if len(data) < rows * size:
+                    raise VisionError(f"{path}: the array {name} ends too soon; describe the images again")
+                yield np.frombuffer(data, dtype).reshape(rows, *shape[1:])
+                left -= rows
+
+    return StreamedArray(shape, pieces, dtype.str)
 
 
 def read_npz(

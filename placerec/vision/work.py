@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from placerec.frames.images import Batch, batches, content_key, with_images
 from placerec.frames.sequence import Gray
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress, RemoteExecutor, workers
-from placerec.journal import Journal
+from placerec.journal import Cache, Journal
 from placerec.version import __version__
 from placerec.vision.images import check_gray, fit_image
 from placerec.vision.spec import DescriptorSpec, describer, descriptor
@@ -76,6 +77,8 @@ class FrameCounts:
 
 def describe_batch(spec: DescriptorSpec, batch: Batch) -> BatchResult:
     """The descriptors of a batch, `values` float32 (m, spec.length): a function of its arguments alone."""
+    if batch.known is not None:
+        return BatchResult.unpack(batch.known)
     rows, kept, reasons = [], [], []
     images = batch.images or (None,) * len(batch.frames)
     for k, (frame, image) in enumerate(zip(batch.frames, images, strict=True)):
@@ -103,30 +106,36 @@ def describe_frame(frame: Frame, image: Gray | str | None, spec: DescriptorSpec)
 
 
 def process_batches(
-    function: Callable[[Batch], BatchResult],
     sequences: Sequence[FrameSequence],
     spec: DescriptorSpec,
     counts: FrameCounts,
     *,
+    then: Callable[[Singles], Arrays] | None = None,
     key: str = "describe",
     work: Executor | None = None,
     journal: Journal | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> Iterator[tuple[FrameTable, Arrays]]:
-    """Of every batch of the sequences, in order, the frames that have a row in what `function` finds, and the arrays.
+    """Of every batch of the sequences, in order, the frames that can be read, and arrays with a row for each of them.
 
     What could not be read is named in warnings and counted in `counts`. Raises VisionError if no image can be read, or
     if descriptors of the kind of `spec` are not made from images here.
 
-    `key`: what the answers depend on besides the images; by it, `journal` gives back those of a run that was cut
-    short, and keeps the others. `progress` is called with frames done and in all, 0 for a camera.
+    `then`: makes the arrays from the descriptors (m, spec.length), where the work is done; None for `values`, these
+    descriptors. `key`: what the arrays depend on besides the descriptors; by it, `journal` gives back those of a run
+    that was cut short, and keeps the others. `cache`: the folder where descriptors are kept for other runs, and taken
+    from. `progress` is called with frames done and in all, 0 for a camera.
     """
     describer(spec)
     endless = any(sequence.recording is not None and sequence.recording.endless for sequence in sequences)
     # Ctrl-C ends what a camera records, and would end other processes.
     work = workers() if endless or work is None else work
+    kept = None if endless or cache is None else Cache(Path(cache) / "described")
     total = 0 if endless else sum(len(sequence.frames) for sequence in sequences)
-    for batch, result in _found(function, sequences, spec, key, work, None if endless else journal):
+    known = 0
+    step = _Step(spec, then, kept is not None)
+    for batch, result in _found(step, sequences, key, work, None if endless else journal, kept):
         for reason in result.reasons:
             log.warning("%s; the frame is skipped", reason)
         blank = result.kept[result.blank].tolist()
@@ -137,45 +146,76 @@ def process_batches(
         counts.frames += len(batch.frames)
         counts.skipped += len(result.reasons)
         counts.constant += len(blank)
+        known += len(batch.frames) if batch.known is not None else 0
         if progress is not None:
             progress(counts.frames, total)
         frames = [batch.frames[k] for k in result.kept.tolist()]
         yield FrameTable.of_frames(batch.sequence, frames), result.arrays
+    if known:
+        log.info("%d of %d frames were described before: %s", known, counts.frames, cache)
     counts.close()
 
 
+@dataclass(frozen=True)
+class _Step:
+    """What is done with a batch, in a worker: its descriptors, and what `then` makes of them.
+
+    `keeping`: new descriptors are among the arrays, as `values`, to be kept.
+    """
+
+    spec: DescriptorSpec
+    then: Callable[[Singles], Arrays] | None
+    keeping: bool
+
+    def __call__(self, batch: Batch) -> BatchResult:
+        """A function of the batch alone."""
+        found = describe_batch(self.spec, batch)
+        if self.then is None:
+            return found
+        new = found.arrays if self.keeping and batch.known is None else {}
+        return replace(found, arrays=self.then(found.arrays["values"]) | new)
+
+
 def _found(
-    function: Callable[[Batch], BatchResult],
+    step: _Step,
     sequences: Sequence[FrameSequence],
-    spec: DescriptorSpec,
     key: str,
     work: Executor,
     journal: Journal | None,
+    cache: Cache | None,
 ) -> Iterator[tuple[Batch, BatchResult]]:
     listed = batches(sequences)
 
-    def key_of(sequence: FrameSequence, batch: Batch) -> bytes:
-        return bytes.fromhex(content_digest(key, __version__, spec.as_dict(), content_key(sequence, batch)))
+    def key_of(what: str, sequence: FrameSequence, batch: Batch) -> bytes:
+        return bytes.fromhex(content_digest(what, __version__, step.spec.as_dict(), content_key(sequence, batch)))
 
     ahead: list[tuple[FrameSequence, Batch]] = []
     if journal is not None:
         for sequence, batch in listed:
-            data = journal.next(key_of(sequence, batch))
+            data = journal.next(key_of(key, sequence, batch))
             if data is None:
                 ahead = [(sequence, batch)]
                 break
             yield batch, BatchResult.unpack(data)
     # What is handed out is remembered until its answer comes: frames and keys, not images.
-    pending: deque[tuple[Batch, bytes]] = deque()
+    pending: deque[tuple[Batch, bytes, bytes]] = deque()
 
     def handed_out() -> Iterator[tuple[FrameSequence, Batch]]:
         for sequence, batch in chain(ahead, listed):
-            pending.append((batch, key_of(sequence, batch) if journal is not None else b""))
-            yield sequence, batch
+            kept_as = key_of("descriptors", sequence, batch) if cache is not None else b""
+            known = cache.get(kept_as) if cache is not None else None
+            shown = batch if known is None else replace(batch, known=b"")
+            pending.append((shown, key_of(key, sequence, batch) if journal is not None else b"", kept_as))
+            yield sequence, batch if known is None else replace(batch, known=known)
 
-    given = with_images(handed_out(), lambda image: _shrunk(image, spec))
-    for result in work(function, map(_absolute, given) if isinstance(work, RemoteExecutor) else given):
-        batch, key_of_batch = pending.popleft()
+    given = with_images(handed_out(), lambda image: _shrunk(image, step.spec))
+    for result in work(step, map(_absolute, given) if isinstance(work, RemoteExecutor) else given):
+        batch, key_of_batch, kept_as = pending.popleft()
+        # What could not be read is tried again by the next run.
+        if cache is not None and batch.known is None and not result.reasons:
+            cache.put(kept_as, replace(result, arrays={"values": result.arrays["values"]}).pack())
+        if step.then is not None and step.keeping:
+            result.arrays.pop("values", None)
         if journal is not None:
             journal.add(key_of_batch, result.pack())
         yield batch, result

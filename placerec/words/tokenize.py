@@ -9,14 +9,16 @@ import numpy as np
 
 from placerec.arrays import Ints, Singles
 from placerec.files import whole_folder
-from placerec.frames import SourceOptions, find_sequences
-from placerec.frames.images import Batch
+from placerec.frames import SourceOptions
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress
 from placerec.journal import Journal, open_journal
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionarySet, describe
 from placerec.vision.chunks import Source, chunks
-from placerec.vision.work import BatchResult, FrameCounts, describe_batch, process_batches
+from placerec.vision.describe import KeptDescriptors
+from placerec.vision.sources import open_sources
+from placerec.vision.storage import Arrays
+from placerec.vision.work import FrameCounts, process_batches
 from placerec.words.folder import OWNED, fill_folder
 from placerec.words.stream import WordColumn, WordStream
 
@@ -31,19 +33,21 @@ def tokenize(
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     work: Executor | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> None:
     """`placerec tokenize`: write the tokens folder `out` (one .tsv per sequence, vocab.txt) of image sources.
 
-    `words`: the words.npz to use. `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed
-    elsewhere (`describe`). `work`: who does the work (`jobs.workers`), None for threads; the bytes do not depend on
-    it. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes on from
-    there.
+    The sources may be files of `placerec describe` (.npz), all of them, in place of images. `words`: the words.npz to
+    use. `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed elsewhere (`describe`).
+    `work`: who does the work (`jobs.workers`), None for threads; the bytes do not depend on it. `cache`: see
+    `describe`. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes
+    on from there.
     """
     dictionaries = DictionarySet.load(Path(words))
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
     with whole_folder(Path(out), OWNED) as folder, open_journal(Path(out)) as journal:
-        parts = _parts(sources, dictionaries, matrix, source_options, work, journal, progress)
+        parts = _parts(sources, dictionaries, matrix, source_options, work, journal, cache, progress)
         names, seen = fill_folder(parts, dictionaries, folder)
     listed = sum(len(dictionary.vocabulary) for dictionary in dictionaries.dictionaries)
     log.info("%s: %d sequences, %d of %d words seen", out, len(names), len(seen), listed)
@@ -56,14 +60,16 @@ def streams_of(
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     work: Executor | None = None,
+    cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> list[WordStream]:
-    """The token streams of image sources: each frame's best-matching unit in `dictionary`, or in each of a set.
+    """The token streams of sources: each frame's best-matching unit in `dictionary`, or in each of a set.
 
-    `matrix`, `work`: see `tokenize`. Raises VisionError for a dictionary that needs a matrix if there is none.
+    `sources`, `matrix`, `work`, `cache`: see `tokenize`. Raises VisionError for a dictionary that needs a matrix if
+    there is none.
     """
     pieces: dict[str, list[WordStream]] = {}
-    for part in _parts(sources, DictionarySet.of(dictionary), matrix, source_options, work, None, progress):
+    for part in _parts(sources, DictionarySet.of(dictionary), matrix, source_options, work, None, cache, progress):
         pieces.setdefault(part.name, []).append(part)
     return [WordStream.concat(parts) for parts in pieces.values()]
 
@@ -102,15 +108,10 @@ def _stream(table: FrameTable, dictionaries: DictionarySet, found: Iterable[tupl
     return WordStream(table.sequences[0], table, first.words, first.distances, named)
 
 
-def tokenize_batch(dictionaries: DictionarySet, batch: Batch) -> BatchResult:
-    """Of a batch's m frames the units int64 (m, D) and distances float32 (m, D) in each of D dictionaries.
-
-    A function of its arguments alone.
-    """
-    found = describe_batch(dictionaries.spec, batch)
-    units, distances = zip(*dictionaries.words(found.arrays["values"]), strict=True)
-    arrays = {"units": np.stack(units, axis=1), "distances": np.stack(distances, axis=1)}
-    return BatchResult(found.kept, found.blank, found.reasons, arrays)
+def _looked_up(dictionaries: DictionarySet, values: Singles) -> Arrays:
+    """Of m descriptors the units int64 (m, D) and distances float32 (m, D) in each of D dictionaries."""
+    units, distances = zip(*dictionaries.words(values), strict=True)
+    return {"units": np.stack(units, axis=1), "distances": np.stack(distances, axis=1)}
 
 
 def _parts(
@@ -120,22 +121,27 @@ def _parts(
     source_options: SourceOptions,
     work: Executor | None,
     journal: Journal | None,
+    cache: Path | str | None,
     progress: Progress | None,
 ) -> Iterator[WordStream]:
     """Pieces of the token streams, those of a sequence one after the other."""
-    sequences = find_sequences(sources, options=source_options, endless=True)
+    sequences = open_sources(sources, source_options, dictionaries.spec, matrix, endless=True)
+    if isinstance(sequences, KeptDescriptors):
+        yield from streams_of_rows(sequences.values.pieces, sequences.table, dictionaries)
+        return
     names = set()
     if matrix is not None:
         parts = iter(tokens_of(describe(sequences, dictionaries.spec, matrix=matrix), dictionaries))
     else:
         found = process_batches(
-            partial(tokenize_batch, dictionaries),
             sequences,
             dictionaries.spec,
             FrameCounts(),
+            then=partial(_looked_up, dictionaries),
             key=dictionaries.fingerprint,
             work=work,
             journal=journal,
+            cache=cache,
             progress=progress,
         )
         parts = (

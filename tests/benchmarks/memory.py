@@ -25,11 +25,24 @@ ROW = "{:<12}" + "{:>12}" * 5
 LINKS = 30_000
 SMALL = ("--image-size", "16", "--jobs")
 COMMANDS = {
-    "describe": ("describe", "images", "-o", "d.npz", *SMALL),
+    "describe": ("describe", "images", "-o", "d.npz", "--no-cache", *SMALL),
     "train-words": (
-        ("train-words", "images", "-o", "w.npz", "--size", "3", "--components", "8", "--epochs", "4", *SMALL)
+        (
+            "train-words",
+            "images",
+            "-o",
+            "w.npz",
+            "--no-cache",
+            "--size",
+            "3",
+            "--components",
+            "8",
+            "--epochs",
+            "4",
+            *SMALL,
+        )
     ),
-    "tokenize": ("tokenize", "images", "-w", "w.npz", "-o", "tokens", "--jobs"),
+    "tokenize": ("tokenize", "images", "-w", "w.npz", "-o", "tokens", "--no-cache", "--jobs"),
     "train-lm": ("train-lm", "streams", "-o", "model", "--order", "3"),
 }
 

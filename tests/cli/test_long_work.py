@@ -31,7 +31,7 @@ def tokenizing(world: Path, out: Path) -> "subprocess.Popen[str]":
     # A shell may have it ignore interrupts.
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     code += "if __name__ == '__main__':\n    from placerec.cli import main; main()"
-    args = ["tokenize", world / "run", "-w", world / "words.npz", "-o", out / "tokens", "--jobs", "2"]
+    args = ["tokenize", world / "run", "-w", world / "words.npz", "-o", out / "tokens", "--jobs", "2", "--no-cache"]
     command = [sys.executable, "-c", code, *map(str, args)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     journal, until = out / JOURNAL, time.monotonic() + 60
@@ -80,6 +80,8 @@ def test_whoever_is_stopped_goes_on_from_there(world: Path, tmp_path: Path) -> N
     assert second.startswith(first)
     assert len(second) > len(first)
 
-    done("tokenize", world / "run", "-w", world / "words.npz", "-o", tmp_path / "tokens", "-q", "--jobs", 1)
+    done(
+        "tokenize", world / "run", "-w", world / "words.npz", "-o", tmp_path / "tokens", "-q", "--jobs", 1, "--no-cache"
+    )
     assert os.listdir(tmp_path) == ["tokens"]
     assert contents(tmp_path / "tokens") == contents(world / "tokens")

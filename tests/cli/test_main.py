@@ -130,7 +130,7 @@ def test_an_interrupt_is_one_line_and_leaves_no_half_file(tmp_path: Path) -> Non
     )
     out = tmp_path / "out" / "words.npz"
     with subprocess.Popen(
-        [sys.executable, "-c", code, "train-words", str(tmp_path / "seq"), "-o", str(out)],
+        [sys.executable, "-c", code, "train-words", str(tmp_path / "seq"), "-o", str(out), "--no-cache"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

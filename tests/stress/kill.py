@@ -111,8 +111,8 @@ def typed(*args: str) -> Callable[[], None]:
 TRAIN = ("train-lm", "tokens", "--order", "5")
 # What is typed; `out` is the output.
 COMMANDS: dict[str, tuple[str, ...]] = {
-    "tokenize": ("tokenize", "runs", "-w", "words.npz", "-o", "place/out"),
-    "train-words": ("train-words", "runs", "-o", "place/out.npz", "--image-size", "32", "--size", "4"),
+    "tokenize": ("tokenize", "runs", "-w", "words.npz", "-o", "place/out", "--no-cache"),
+    "train-words": ("train-words", "runs", "-o", "place/out.npz", "--image-size", "32", "--size", "4", "--no-cache"),
     "train-lm": (*TRAIN, "-o", "place/out"),
     "update": ("update", "place/model", "today.tsv"),
     "experiment": ("experiment", "grid.toml", "-o", "place/out"),

@@ -85,7 +85,8 @@ VIEWS = ("--views", "plain,pn", "--sizes", "2,3", "--image-size", "32")
 
 def test_several_dictionaries_are_each_told_of(tmp_path: Path) -> None:
     run, out = write_images(tmp_path / "run1", seed=1), tmp_path / "words.npz"
-    result = done("train-words", run, "-o", out, *VIEWS, "--held-out", write_images(tmp_path / "run2", seed=2))
+    held_out = write_images(tmp_path / "run2", seed=2)
+    result = done("train-words", run, "-o", out, *VIEWS, "--held-out", held_out, "--no-cache")
     made = DictionarySet.load(out)
     assert (made.names, made.sequences) == (("", "plain3", "pn2", "pn3"), ("run1",))
     told = result.stderr.splitlines()

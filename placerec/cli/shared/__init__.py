@@ -37,6 +37,7 @@ from placerec.cli.shared.values import (
 )
 from placerec.cli.shared.words import dictionary_options as dictionary_options
 from placerec.cli.shared.work import (
+    cache_option as cache_option,
     cluster_option as cluster_option,
     jobs_option as jobs_option,
     work_options as work_options,

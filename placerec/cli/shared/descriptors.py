@@ -36,7 +36,10 @@ def descriptor_option(text: str, *kinds: str) -> Callable[[Command], Command]:
 
 
 def descriptor_options(function: Command) -> Command:
-    """--descriptor, --variant, --image-size, --fit: what a descriptor is. The command gets `spec` and `matrix`."""
+    """--descriptor, --variant, --image-size, --fit: what a descriptor is.
+
+    The command gets `spec`, None if nobody asked for anything, and `matrix`.
+    """
 
     @descriptor_option(
         "What describes a frame; FILE: a matrix computed elsewhere, one row a frame.", "gist", "centrist"
@@ -67,13 +70,19 @@ def descriptor_options(function: Command) -> Command:
         kind, matrix = descriptor
         settings = {name: options.pop(name) for name in ("variant", "image_size", "fit")}
         context = click.get_current_context()
+        given = {
+            name
+            for name in ("descriptor", *settings)
+            if context.get_parameter_source(name) is not ParameterSource.DEFAULT
+        }
         for name in [name for name in settings if name not in KINDS[kind].settings]:
-            if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
+            if name in given:
                 raise click.UsageError(
                     f"--{name.replace('_', '-')} says nothing about {kind} descriptors; leave it out"
                 )
             del settings[name]
-        spec = None if matrix else DescriptorSpec(kind=kind, **settings)
+        # What nobody asked for is the default, or what a file of descriptors holds.
+        spec = DescriptorSpec(kind=kind, **settings) if given and not matrix else None
         return function(*args, spec=spec, matrix=matrix, **options)
 
     return described

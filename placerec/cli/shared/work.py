@@ -1,13 +1,14 @@
-"""Who does the work: --jobs, --cluster."""
+"""Who does the work, and what need not be done again: --jobs, --cluster, --cache."""
 
 import functools
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from placerec.cli.shared import groups
-from placerec.cli.shared.values import Command, usage
+from placerec.cli.shared.values import PATH, Command, usage
 
 if TYPE_CHECKING:
     from placerec.jobs import Executor
@@ -29,6 +30,7 @@ jobs_option = groups.work(
     type=click.IntRange(min=1),
     help="Processes that share the work; the output is the same for any number.  [default: one a processor]",
 )
+CACHE = ".placerec-cache"
 _CLUSTER = groups.work(
     "--cluster",
     metavar="ADDRESS|local:N",
@@ -72,3 +74,23 @@ def work_options(function: Command) -> Command:
             return function(*args, work=work or workers(jobs or processors()), **options)
 
     return working
+
+
+def cache_option(function: Command) -> Command:
+    """--cache, --no-cache: where descriptors are kept for other commands. The command gets `cache`, and has `out`."""
+
+    @groups.work(
+        "--cache",
+        metavar="DIR",
+        type=PATH,
+        help=f"Where descriptors are kept for other commands that see the images.  [default: {CACHE}/ beside -o]",
+    )
+    @groups.work("--no-cache", is_flag=True, help="Keep no descriptors, and use none that were kept.")
+    @functools.wraps(function)
+    def keeping(*args: Any, cache: Path | None, no_cache: bool, out: Path | None, **options: Any) -> Any:
+        if no_cache and cache is not None:
+            raise click.UsageError("--cache and --no-cache contradict each other; leave one of them out")
+        beside = None if no_cache or out is None else out.parent / CACHE
+        return function(*args, out=out, cache=cache or beside, **options)
+
+    return keeping
