@@ -69,12 +69,12 @@ def test_commands_are_listed_by_what_people_do() -> None:
 @pytest.mark.parametrize(
     ("name", "groups"),
     [
-        ("decode", ["Options", "How sources are read", "How words become beliefs", "General"]),
+        ("decode", ["Options", "How sources are read", "How words become beliefs", "What is kept", "General"]),
         (
             "train-words",
             [
                 *("Options", "How sources are read", "How words are learned", "What describes an image"),
-                *("Who does the work", "General"),
+                *("What is kept", "Who does the work", "General"),
             ],
         ),
         ("lab", ["Options", "General"]),

@@ -79,13 +79,13 @@ def work_options(function: Command) -> Command:
 def cache_option(function: Command) -> Command:
     """--cache, --no-cache: where descriptors are kept for other commands. The command gets `cache`, and has `out`."""
 
-    @groups.work(
+    @groups.kept(
         "--cache",
         metavar="DIR",
         type=PATH,
         help=f"Where descriptors are kept for other commands that see the images.  [default: {CACHE}/ beside -o]",
     )
-    @groups.work("--no-cache", is_flag=True, help="Keep no descriptors, and use none that were kept.")
+    @groups.kept("--no-cache", is_flag=True, help="Keep no descriptors, and use none that were kept.")
     @functools.wraps(function)
     def keeping(*args: Any, cache: Path | None, no_cache: bool, out: Path | None, **options: Any) -> Any:
         if no_cache and cache is not None:
