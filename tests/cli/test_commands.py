@@ -468,7 +468,7 @@ def test_quiet_is_silent_and_other_commands_tell_what_they_did(world: Path, tmp_
 
 
 def test_there_is_no_progress_bar_without_a_terminal(world: Path, tmp_path: Path) -> None:
-    result = done("tokenize", world / "runs", "-w", world / "words.npz", "-o", tmp_path / "tokens")
+    result = done("tokenize", world / "runs", "-w", world / "words.npz", "-o", tmp_path / "tokens", "--no-cache")
     assert result.stderr == (
         f"24 frames described, 0 skipped, 0 of one grey level throughout\n{tmp_path / 'tokens'}: 2 sequences, "
         + result.stderr.rpartition("2 sequences, ")[2]
