@@ -1,7 +1,7 @@
 """From counts to a back-off model, with SRILM's arithmetic: section 6 of our SRILM specification."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +92,8 @@ def estimate_mutable(
 _MOST_STEPS = 1e6
 # N-grams times attempts that are told at once.
 _AT_ONCE = 1 << 18
+# N-grams that are estimated at once: what is computed on the way stays in the processor's cache.
+_BLOCK = 1 << 15
 
 
 def _seen(counts: NgramCounts, n: int) -> Mask:
@@ -127,6 +129,7 @@ def _estimate_order(
     rows = np.flatnonzero(counts.seen[n - 1] & ~closed[prefix])
     word = trie.word(n)[rows]
     contexts, group = runs(prefix[rows])
+    del prefix
     stats = _statistics(counts, n, rows, group, len(contexts), model.predictable[word], meta, word)
     if trust_totals and n > 1:
         stats = Context(counts.counts[n - 2][contexts].astype(np.float64), stats.types, stats.types2, stats.types3)
@@ -138,9 +141,9 @@ def _estimate_order(
     silent = alive & ~model.predictable[word] & (trie.vocabulary.mask([unknown])[word] if n == 1 else True)
     silent_of = per_context(group[silent], len(contexts))
     size = model.names + int((meta >= 0).sum())
-    order = _Order(
-        n, rule, size, rows[kept], group[kept], count[kept], _lower(model, n, rows[kept]), contexts, stats, silent_of
-    )
+    if not kept.all():
+        rows, group, count = rows[kept], group[kept], count[kept]
+    order = _Order(n, rule, size, rows, group, count, _lower(model, n, rows), contexts, stats, silent_of)
     _fill_order(model, order, trace)
 
 
@@ -157,6 +160,9 @@ def _statistics(
 ) -> Context:
     """Section 6.2, per context (size,): totals and types over the words that are events, and what meta counts add."""
     count = counts.counts[n - 1][rows].astype(np.float64)
+    if (meta < 0).all():
+        columns = (np.where(predictable, count, 0), predictable, predictable & (count >= 2), predictable & (count >= 3))
+        return Context(*(per_context(group, size, column) for column in columns))
     times = meta[word]
     tag = (times >= 0) & (n > 1)
     total_tag, type_tag = tag & (times == 0), tag & (times > 0)
@@ -200,14 +206,17 @@ def _fill_order(model: MutableModel, order: _Order, trace: Trace) -> None:
     todo = np.ones(len(order.contexts), bool)
     attempt = 0
     while todo.any():
-        at = np.flatnonzero(todo[group])
+        tried = todo[group]
         trace.discarded_ngrams(n, int(order.silent[todo].sum()), 0)
-        p[at], log10_p[at], kept[at] = _attempt(order, at, total, interpolate, attempt, trace)
-        used = at[kept[at]]
-        spent = per_context(group[used], len(order.contexts), p[used])
+        for part in _parts(tried, whole=trace.every_attempt):
+            p[part], log10_p[part], kept[part] = _attempt(order, part, total, interpolate, attempt, trace)
+        tried &= kept
+        spent = per_context(group, len(order.contexts), np.where(tried, p, 0))
         todo = todo & roomy & (spent > 1 - EPSILON)
+        if not todo.any():
+            break
         # A context that leaves nothing to unseen words is done again, first without interpolation, then thinner.
-        again, used = np.flatnonzero(todo), used[todo[group[used]]]
+        again, used = np.flatnonzero(todo), np.flatnonzero(tried & todo[group])
         place, interpolated = np.searchsorted(again, group[used]), bool(interpolate[again].any())
         trace.no_mass(n, attempt, order.contexts[again], place, order.rows[used], p[used], interpolated=interpolated)
         _check_reachable(n, total[todo], spent[todo])
@@ -225,6 +234,16 @@ def _fill_order(model: MutableModel, order: _Order, trace: Trace) -> None:
     model.stored[n - 1][stored] = True
     if n > 1:
         model.add_contexts(n - 1, runs(model.trie.prefix(n)[stored])[0])
+
+
+def _parts(which: Mask, *, whole: bool) -> Iterator[slice | Ints]:
+    """The n-grams of a mask in parts of _BLOCK, or all at once: where attempts are told, so are whole contexts."""
+    at = None if which.all() else np.flatnonzero(which)
+    number = len(which) if at is None else len(at)
+    size = max(1, number) if whole else _BLOCK
+    for start in range(0, number, size):
+        part = slice(start, start + size)
+        yield part if at is None else at[part]
 
 
 def _least_total(order: _Order, contexts: Ints, total: Floats) -> Floats:
@@ -278,7 +297,7 @@ def _check_reachable(n: int, total: Floats, spent: Floats) -> None:
 
 
 def _attempt(
-    order: _Order, at: Ints, total: Floats, interpolate: Mask, attempt: int, trace: Trace
+    order: _Order, at: slice | Ints, total: Floats, interpolate: Mask, attempt: int, trace: Trace
 ) -> tuple[Floats, Singles, Mask]:
     """p of the n-grams `at` with these totals, log10 p, and which of them are kept."""
     group, count, lower, stats = order.group[at], order.count[at], order.lower[at], order.stats

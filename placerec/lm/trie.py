@@ -68,8 +68,14 @@ class Trie:
         found = [np.zeros(len(self.vocabulary), np.int64)]
         for n in range(2, self.order + 1):
             word = self.word(n)
-            found.append(word if n == 2 else self.find(n - 1, found[n - 2][self.prefix(n)], word))
+            found.append(word if n == 2 else self._find_all(n - 1, found[n - 2][self.prefix(n)], word))
         return tuple(found)
+
+    def _find_all(self, n: int, prefix: Ints, word: Ints) -> Ints:
+        """What `find` gives, sooner for about as many n-grams as there are."""
+        wanted = prefix * len(self.vocabulary) + word
+        wanted[prefix < 0] = -1
+        return RowIndex(self.keys[n - 1]).find(wanted)
 
     @property
     def closed(self) -> bool:
