@@ -31,6 +31,12 @@ _PURPOSES = {
     "make-kn-discounts": "Kneser-Ney parameters.",
     "make-abs-discount": "An absolute discount.",
     "make-big-lm": "Models of many counts.",
+    "make-batch-counts": "Count many texts.",
+    "merge-batch-counts": "Merge what was counted.",
+    "reverse-lm": "A bigram model, backwards.",
+    "ppl-from-log": "Totals of single tokens.",
+    "compare-ppls": "Two models, token by token.",
+    "select-vocab": "Weigh words by a text.",
 }
 
 
@@ -55,6 +61,12 @@ EXAMPLES = {
     "make-kn-discounts": "min=1 all.gt3counts",
     "make-abs-discount": "all.gt2counts",
     "make-big-lm": "-name all -read all.counts -lm all.lm",
+    "make-batch-counts": "texts.list 10 cat counts -order 3",
+    "merge-batch-counts": "counts",
+    "reverse-lm": "bigrams.lm",
+    "ppl-from-log": "part.ppl",
+    "compare-ppls": "mindelta=0.01 a.ppl b.ppl",
+    "select-vocab": "-heldout tune.txt news.txt talks.counts",
 }
 
 

@@ -1,6 +1,8 @@
 """The small scripts of SRILM's manual pages: models, counts of counts, perplexities."""
 
+import gzip
 import io
+import os
 import random
 import re
 from collections.abc import Callable, Sequence
@@ -11,16 +13,20 @@ import pytest
 from placerec.lm import read_arpa
 from placerec.srilm.text.streams import Streams
 from placerec.srilm.tools.add_ppls import add_ppls
+from placerec.srilm.tools.batch_counts import make_batch_counts, merge_batch_counts
 from placerec.srilm.tools.discount_scripts import (
     get_gt_counts,
     make_abs_discount,
     make_gt_discounts,
     make_kn_discounts,
 )
-from placerec.srilm.tools.lm_scripts import get_unigram_probs, make_sub_lm, sort_lm
+from placerec.srilm.tools.lm_scripts import get_unigram_probs, make_sub_lm, reverse_lm, sort_lm
 from placerec.srilm.tools.make_big_lm import make_big_lm
+from placerec.srilm.tools.ngram import ngram
 from placerec.srilm.tools.ngram_count import ngram_count
+from placerec.srilm.tools.select_vocab import select_vocab
 from placerec.srilm.tools.subtract_ppls import subtract_ppls
+from placerec.srilm.tools.token_lines import compare_ppls, ppl_from_log
 
 Tool = Callable[[Sequence[str], Streams], int]
 LM = """
@@ -161,3 +167,186 @@ def test_make_big_lm_gives_the_model_of_all_counts(counts: Path) -> None:
         assert Path("big.lm").read_text() == Path("plain.lm").read_text()
     assert Path("aux.gt1").exists()
     assert call(make_big_lm, "-read", str(counts), "-lm", "big.lm")[0] == 2
+
+
+def test_a_big_model_of_several_files_is_that_of_their_sum(counts: Path) -> None:
+    lines = counts.read_text().splitlines(keepends=True)
+    Path("odd.counts").write_text("".join(lines[::2]).removesuffix("\n"))
+    Path("even.counts.gz").write_bytes(gzip.compress("".join(lines[1::2]).encode()))
+    for options in (["-order", "3"], ["-wbdiscount"], ["-ngram-filter", "sed s/w7/x7/g"]):
+        plain = ["-read", str(counts), "-lm", "plain.lm"]
+        if options[0] == "-ngram-filter":
+            plain[1] = "mapped"
+            Path("mapped").write_text("".join(line.replace("w7", "x7") for line in lines))
+        both = ["-read", "odd.counts", "-read", "even.counts.gz"]
+        assert call(make_big_lm, "-name", "aux", *both, "-lm", "big.lm", *options)[0] == 0
+        assert call(ngram_count, *plain, *(options if options[0] != "-ngram-filter" else []))[0] == 0
+        assert Path("big.lm").read_text() == Path("plain.lm").read_text()
+
+
+@pytest.fixture
+def texts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Five texts, one packed, one without a line end, and a list of them; all of them in all.txt."""
+    monkeypatch.chdir(tmp_path)
+    whole = [f"a b c{i}\nb c{i} a\n" for i in range(5)]
+    Path("all.txt").write_text("".join(whole))
+    for i, text in enumerate(whole):
+        Path(f"t{i}").write_text(text)
+    Path("t3").write_text(whole[3].removesuffix("\n"))
+    Path("t4.gz").write_bytes(gzip.compress(whole[4].encode()))
+    Path("words").write_text("a\nb\n" + "".join(f"c{i}\n" for i in range(5)))
+    Path("list").write_text("# texts\nt0\nt1\n\nt2\nt3\nt4.gz\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize("size", ["1", "2", "9"])
+def test_counts_of_batches_are_merged_to_those_of_all_texts(texts: Path, size: str) -> None:
+    assert call(make_batch_counts, "list", size, "cat", "c", "-order", "2")[0] == 0
+    assert call(merge_batch_counts, "c")[::2] == (0, f"final counts in c/{(left := os.listdir('c')[0])}\n")
+    assert os.listdir("c") == [left]
+    assert left == {"1": "merge-iter3-1.ngrams.gz", "2": "merge-iter2-1.ngrams.gz", "9": "batch-1.ngrams.gz"}[size]
+    expected = call(ngram_count, "-text", "all.txt", "-order", "2", "-sort")[1]
+    assert gzip.decompress(Path("c", left).read_bytes()).decode() == expected
+
+
+def test_more_batches_than_a_process_may_open_files_are_merged(texts: Path) -> None:
+    names = []
+    for i in range(130):
+        Path(f"n{i}").write_text(f"x{i}\ny\n")
+        names.append(f"n{i}\n")
+    Path("many").write_text("".join(names))
+    assert call(make_batch_counts, "many", "1", "cat", "c", "-order", "1")[0] == 0
+    assert call(merge_batch_counts, "-l", "130", "c")[0] == 0
+    merged = gzip.decompress(Path("c/merge-iter1-1.ngrams.gz").read_bytes()).decode().splitlines()
+    assert {"y\t130", "x129\t1", "</s>\t260"} <= set(merged)
+    assert len(merged) == 133
+    assert os.listdir("c") == ["merge-iter1-1.ngrams.gz"]
+
+
+def test_listed_counts_are_merged_and_stay(texts: Path) -> None:
+    for name in ("t0", "t1"):
+        assert call(ngram_count, "-text", name, "-sort", "-write", f"{name}.counts")[0] == 0
+    Path("of").write_text("t0.counts\nt1.counts\n")
+    assert call(merge_batch_counts, "-float-counts", "c", "of")[0] == 0
+    assert Path("t0.counts").exists()
+    assert "</s>\t4\n" in gzip.decompress(Path("c/merge-iter1-1.ngrams.gz").read_bytes()).decode()
+
+
+def test_a_filter_conditions_the_texts_of_a_batch(texts: Path) -> None:
+    assert call(make_batch_counts, "list", "10", "tr a-z A-Z | head -n 3", "c", "-order", "1")[0] == 0
+    counted = gzip.decompress(Path("c/batch-1.ngrams.gz").read_bytes()).decode()
+    assert counted == "</s>\t3\n<s>\t3\nA\t3\nB\t3\nC0\t2\nC1\t1\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "complaint"),
+    [
+        (["list", "0"], 2, "batch size 0: a number above 0 is needed"),
+        (["nothing"], 1, "nothing: No such file or directory"),
+        (["empty"], 1, "empty: no texts are listed"),
+        (["gone"], 1, "gone.txt: No such file or directory"),
+        (["list", "2", "exit 3"], 1, "the filter 'exit 3' ended with status 3"),
+        (["list", "2", "cat", "all.txt"], 1, "all.txt: "),
+    ],
+)
+def test_a_batch_that_cannot_be_counted_leaves_no_counts(
+    texts: Path, arguments: list[str], status: int, complaint: str
+) -> None:
+    Path("empty").write_text("# nothing\n")
+    Path("gone").write_text("t0\ngone.txt\n")
+    found, _, error = call(make_batch_counts, *arguments)
+    assert (found, complaint in error) == (status, True), error
+    assert not list(Path().glob("counts/*"))
+
+
+def test_counts_of_an_older_run_are_not_mixed_in(texts: Path) -> None:
+    assert call(make_batch_counts, "list", "2")[0] == 0
+    status, _, error = call(make_batch_counts, "list", "5")
+    assert status == 1
+    assert "counts/batch-2.ngrams.gz is of a run with more batches" in error
+    assert call(merge_batch_counts, "nowhere")[::2] == (
+        1,
+        "merge-batch-counts: nowhere: no counts to merge; see make-batch-counts\n",
+    )
+    assert call(merge_batch_counts, "-l", "1", "counts")[0] == 2
+    assert call(merge_batch_counts, "-x", "counts")[0] == 2
+
+
+def test_a_model_that_is_reversed_scores_sentences_backwards(texts: Path) -> None:
+    Path("back.txt").write_text(
+        "".join(" ".join(reversed(line.split())) + "\n" for line in Path("all.txt").read_text().splitlines())
+    )
+    assert call(ngram_count, "-text", "t1", "-order", "2", "-wbdiscount", "-vocab", "words", "-lm", "m.lm")[0] == 0
+    status, reversed_model, error = call(reverse_lm, "m.lm")
+    assert (status, error) == (0, "")
+    Path("r.lm").write_text(reversed_model)
+    found = [
+        call(ngram, "-order", "2", "-lm", lm, "-ppl", text)[1]
+        for lm, text in (("m.lm", "all.txt"), ("r.lm", "back.txt"))
+    ]
+    totals = [re.findall(r"[-\d.]+", text.partition(":")[2]) for text in found]
+    assert [float(n) for n in totals[1]] == pytest.approx([float(n) for n in totals[0]], rel=1e-5)
+    assert call(reverse_lm, stdin=LM)[::2] == (
+        1,
+        "reverse-lm: only bigram models are reversed; see make-sub-lm maxorder=2\n",
+    )
+
+
+def scored(model: str, text: str) -> str:
+    """What `ngram -debug 2` says of a text."""
+    status, out, _ = call(ngram, "-lm", model, "-ppl", text, "-debug", "2")
+    assert status == 0
+    return out
+
+
+def test_totals_of_all_tokens_are_those_of_the_text(texts: Path) -> None:
+    assert call(ngram_count, "-text", "t1", "-order", "2", "-wbdiscount", "-lm", "m.lm")[0] == 0
+    log = scored("m.lm", "all.txt")
+    expected = log.rpartition("file all.txt: ")[2]
+    assert "10 sentences, 30 words, 8 OOVs\n" in expected
+    status, out, error = call(ppl_from_log, stdin=log)
+    assert (status, error) == (0, "")
+    assert re.sub(r"\S*\d", "", out) == re.sub(r"\S*\d", "", expected)
+    numbers = [[float(number) for number in re.findall(r" (-?\d\S*)", " " + text)] for text in (out, expected)]
+    assert numbers[0] == pytest.approx(numbers[1], rel=1e-6)
+    ends = "".join(line for line in log.splitlines(keepends=True) if line.startswith("\tp( </s>"))
+    assert call(ppl_from_log, stdin=ends)[1].startswith("10 sentences, 0 words, 0 OOVs\n0 zeroprobs, logprob= -")
+    assert call(ppl_from_log)[1] == "0 sentences, 0 words, 0 OOVs\n"
+
+
+def test_two_models_are_compared_token_by_token(texts: Path) -> None:
+    lines = [f"\tp( {word} | a ...) \t= [1gram] 0.5 [ {{}} ]\n" for word in "abcd"]
+    Path("one").write_text("".join(lines).format("-1", "-1", "-inf", "-inf"))
+    Path("two").write_text("".join(lines).format("-1.5", "-0.99", "-inf", "-2"))
+    assert call(compare_ppls, "one", "two")[1] == "total 4, equal 1, higher 2, lower 1\n"
+    assert call(compare_ppls, "mindelta=0.1", "one", "two")[1] == "total 4, equal 2, higher 1, lower 1\n"
+    assert call(compare_ppls, "mindelta=x", "one", "two")[0] == 2
+    assert call(compare_ppls, "one")[0] == 2
+    Path("two").write_text("".join(lines[:3]).format("-1", "-1", "-1"))
+    status, out, error = call(compare_ppls, "one", "two")
+    assert (status, out) == (1, "")
+    assert error == "compare-ppls: one and two are not of one text (token 4: d and none)\n"
+    Path("two").write_text("\tp( a | ) \t= [1gram] 0.5 [ x ]\n")
+    assert "two: line 1: 'p( a | ) \\t= [1gram] 0.5 [ x ]' has no log probability" in call(ppl_from_log, "two")[2]
+
+
+def test_a_vocabulary_is_selected_by_what_makes_a_text_probable(texts: Path) -> None:
+    Path("near.txt").write_text("a a a b\n")
+    Path("far.counts").write_text("c\t3\nd 1\nc d\t5\n")
+    Path("m.lm").write_text(LM)
+    Path("held.txt").write_text("a b a\n")
+    status, out, error = call(select_vocab, "-heldout", "held.txt", "-scale", "100", "near.txt", "far.counts", "m.lm")
+    assert status == 0
+    weights = {word: float(weight) for word, weight in (line.split("\t") for line in out.splitlines())}
+    assert set(weights) == {"a", "b", "c", "d"}
+    assert sum(weights.values()) == pytest.approx(100)
+    assert weights["a"] > weights["b"] > 10 > weights["c"] == pytest.approx(3 * weights["d"])
+    assert "weights: near.txt " in error
+    assert call(select_vocab, "-quiet", "-heldout", "held.txt", "near.txt") == (
+        0,
+        "a\t750000.000000\nb\t250000.000000\n",
+        "",
+    )
+    Path("x.sentid").write_text("id1 a\nid2 b b b\n")
+    assert call(select_vocab, "-quiet", "-heldout", "held.txt", "x.sentid")[1].startswith("a\t250000.")
+    assert call(select_vocab, "near.txt")[0] == 2

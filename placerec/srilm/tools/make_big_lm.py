@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from io import BytesIO
 
+from placerec.srilm.text.pipes import as_file, filtered, joined
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 from placerec.srilm.tools import ngram_count
 from placerec.srilm.tools.discounting import given_method
 from placerec.srilm.tools.options import Option, parse
 
 TOOL = "make-big-lm"
-USAGE = "usage: {tool} -name NAME -read COUNTS -lm MODEL [-trust-totals] [options of ngram-count]"
+USAGE = "usage: {tool} -name NAME -read COUNTS ... -lm MODEL [-ngram-filter COMMAND] [options of ngram-count]"
 _META_TAG = "__meta__"
 _MOST_ORDERS = 9
 
@@ -23,10 +24,19 @@ def make_big_lm(arguments: Sequence[str], streams: Streams, tool: str = TOOL) ->
     options = parse(tool, {**ngram_count.OPTIONS, **own}, arguments, silent)
     if not (options["name"] and options["read"] and options["lm"]):
         raise SrilmError(USAGE.format(tool=tool), 2)
-    if options["read"] == "-" or options["ngram-filter"] or options["text"]:
-        raise SrilmError(
-            f"{tool}: counts are read twice from a file; -read -, -ngram-filter and -text are not for it", 2
-        )
+    rest, reads = _split(arguments)
+    if "-" in reads or options["text"]:
+        raise SrilmError(f"{tool}: counts are read twice from files; -read - and -text are not for it", 2)
+
+    def estimate(*arguments: str) -> int:
+        if len(reads) == 1 and not options["ngram-filter"]:
+            return ngram_count.ngram_count(["-read", *reads, *arguments], streams, tool)
+        counts = joined(reads, streams)
+        if options["ngram-filter"]:
+            counts = filtered(options["ngram-filter"], counts)
+        inner = Streams(as_file(counts), streams.stdout, streams.stderr)
+        return ngram_count.ngram_count(["-read", "-", *arguments], inner, tool)
+
     order = max(1, options["order"])
     if order > _MOST_ORDERS:
         raise SrilmError(f"{tool}: -order {order}: parameters have files up to order {_MOST_ORDERS}", 2)
@@ -34,7 +44,7 @@ def make_big_lm(arguments: Sequence[str], streams: Streams, tool: str = TOOL) ->
     if given_method(options, "")[0] or any(
         given_method(options, str(n))[0] not in (None, "gt") for n in range(1, order + 1)
     ):
-        return ngram_count.ngram_count(_without(arguments), streams, tool)
+        return estimate(*rest)
     files = [text for n in range(1, order + 1) for text in (f"-gt{n}", f"{options['name']}.gt{n}")]
     bounds = [
         text
@@ -42,22 +52,20 @@ def make_big_lm(arguments: Sequence[str], streams: Streams, tool: str = TOOL) ->
         if name.startswith("gt") and name.endswith(("min", "max"))
         for text in (f"-{name}", f"{options[name]:g}")
     ]
-    first = ["-read", options["read"], "-order", str(order), *bounds, *files]
-    status = ngram_count.ngram_count(first, streams, tool)
-    if status:
-        return status
-    rest = [*_without(arguments), *files, "-read-with-mincounts", "-meta-tag", _META_TAG]
-    return ngram_count.ngram_count(rest, streams, tool)
+    status = estimate("-order", str(order), *bounds, *files)
+    return status or estimate(*rest, *files, "-read-with-mincounts", "-meta-tag", _META_TAG)
 
 
-def _without(arguments: Sequence[str]) -> list[str]:
-    """The arguments that ngram-count has, too."""
-    kept = []
+def _split(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The arguments that ngram-count has, too, without -read; and the files that -read names, each time it is given."""
+    kept, reads = [], []
     queue = list(arguments)
     while queue:
         argument = queue.pop(0)
-        if argument in ("-name", "-max-per-file") and queue:
+        if argument in ("-name", "-max-per-file", "-ngram-filter") and queue:
             queue.pop(0)
+        elif argument == "-read" and queue:
+            reads.append(queue.pop(0))
         else:
             kept.append(argument)
-    return kept
+    return kept, reads

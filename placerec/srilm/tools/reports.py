@@ -19,7 +19,8 @@ from placerec.srilm.text.vocabulary import WordList
 TOKENS, SUMS, RANKS = 2, 3, 4
 
 
-def _block(totals: Totals, ranks: Ranks | None) -> str:
+def totals_block(totals: Totals, ranks: Ranks | None = None) -> str:
+    """The block of statistics (section 10.2): totals and perplexities, and the ranks if there are any."""
     # A negative weight times no OOVs is no -0.
     totals = Totals(*(total + 0.0 for total in totals))
     text = f"{totals.sentences:.16g} sentences, {totals.words:.16g} words, {totals.oovs:.16g} OOVs\n"
@@ -69,7 +70,7 @@ class Printer:
 
     def block(self, totals: Totals, ranks: Ranks | None) -> str:
         """The block of statistics (section 10.2): totals and perplexities, and with -debug 4 the ranks."""
-        return _block(totals, ranks if self.debug >= RANKS else None)
+        return totals_block(totals, ranks if self.debug >= RANKS else None)
 
     def token(self, word: int, context: str, tag: str, p: float, log10_p: float, weight: float = 1) -> str:
         """The line of a token without its end: p( WORD | CONTEXT) = TAG P [ LOG10P ] (section 10.3)."""
@@ -194,7 +195,7 @@ class _Summary:
             self.printer.streams.print(text + "\n" + "".join(line.text) + block + "\n")
 
     def _group(self) -> None:
-        self.printer.streams.print(_block(self.group, None) + "\n")
+        self.printer.streams.print(totals_block(self.group) + "\n")
         self.group, self.grouped = Totals(), True
 
     def finish(self, name: str) -> None:
@@ -245,7 +246,7 @@ def print_counts(name: str, scorer: Scorer, printer: Printer, counting: Counting
             table[ngram] = total if counting.fractional or total <= _MOST else total - _MOST - 1
     if table or parts:
         parts.append(_group(table, scorer, printer, counting, shown=bool(parts) or printer.debug >= 1))
-    whole = printer.block(*_sum(parts)) if parts else _block(Totals(), None)
+    whole = printer.block(*_sum(parts)) if parts else totals_block(Totals())
     printer.streams.print(f"file {name}: {whole}")
 
 

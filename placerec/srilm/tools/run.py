@@ -30,13 +30,21 @@ TOOLS = (
     "make-kn-discounts",
     "make-abs-discount",
     "make-big-lm",
+    "make-batch-counts",
+    "merge-batch-counts",
+    "reverse-lm",
+    "ppl-from-log",
+    "compare-ppls",
+    "select-vocab",
 )
 # Small ones that share a module; each of the others has one of its name.
 _TOGETHER = {
-    **dict.fromkeys(("sort-lm", "make-sub-lm", "get-unigram-probs"), "lm_scripts"),
+    **dict.fromkeys(("sort-lm", "make-sub-lm", "get-unigram-probs", "reverse-lm"), "lm_scripts"),
     **dict.fromkeys(
         ("get-gt-counts", "make-gt-discounts", "make-kn-discounts", "make-abs-discount"), "discount_scripts"
     ),
+    **dict.fromkeys(("make-batch-counts", "merge-batch-counts"), "batch_counts"),
+    **dict.fromkeys(("ppl-from-log", "compare-ppls"), "token_lines"),
 }
 _INTERRUPTED = 130
 
