@@ -138,10 +138,9 @@ def evaluate_files(sources: Iterable[Path | str], *, plot: Path | str | None = N
     """
     if plot is not None:
         check_figure(plot)
-    paths = _files([Path(source) for source in sources])
-    beliefs = [_read(path) for path in paths]
-    names = unique_names([(one.name, path) for one, path in zip(beliefs, paths, strict=True)], EvaluationError)
-    beliefs = [replace(one, stream=one.stream.renamed(name)) for one, name in zip(beliefs, names, strict=True)]
+    named = read_files(sources)
+    names = unique_names([(one.name, path) for path, one in named], EvaluationError)
+    beliefs = [replace(one, stream=one.stream.renamed(name)) for (_, one), name in zip(named, names, strict=True)]
     evaluation = evaluate(beliefs)
     warn_of_still_sequences(one.truth for one in beliefs)
     columns = dict.fromkeys(place for one in beliefs for place in (*one.places, UNKNOWN_PLACE))
@@ -149,6 +148,14 @@ def evaluate_files(sources: Iterable[Path | str], *, plot: Path | str | None = N
     if plot is not None:
         plot_evaluation(beliefs, evaluation, plot)
     return evaluation
+
+
+def read_files(sources: Iterable[Path | str]) -> list[tuple[Path, Beliefs]]:
+    """Read beliefs files, all of folders of them, or standard input (`-`), each with its path.
+
+    Raises EvaluationError for what cannot be read, for a folder without such files, and for a file that comes twice.
+    """
+    return [(path, _read(path)) for path in _files([Path(source) for source in sources])]
 
 
 def plot_evaluation(beliefs: Sequence[Beliefs], evaluation: Evaluation, path: Path | str) -> None:

@@ -1,9 +1,10 @@
-"""A page to look at: one HTML file that needs no network, no scripts and no second file.
+"""A page to look at: one HTML file that needs no network and no second file.
 
 Every function takes plain text, escapes it and gives back HTML; `html_page` puts the pieces together.
 """
 
 import base64
+import hashlib
 import html
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -42,7 +43,7 @@ pre { background: var(--shade); border-radius: 4px; padding: .8rem 1rem; overflo
 @media print { body { margin: 0; max-width: none; } figure, table { break-inside: avoid; } }
 """.strip()
 
-# The browser itself then refuses whatever would leave the file.
+# The browser itself then refuses whatever would leave the file, and every script but the page's own.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
 # What a cell of a table may be marked as.
@@ -52,24 +53,33 @@ _NO_MARKS: Mapping[str, Mark] = MappingProxyType({})
 _KINDS = ((b"\x89PNG\r\n\x1a\n", "image/png"), (b"\xff\xd8\xff", "image/jpeg"))
 
 
-def html_page(title: str, body: Iterable[str]) -> str:
-    """A whole page: `title` as text, `body` as pieces of HTML from the functions below."""
+def html_page(title: str, body: Iterable[str], *, style: str = "", script: str = "") -> str:
+    """A whole page: `title` as text, `body` as pieces of HTML from the functions below.
+
+    `style`: CSS behind that of all pages; `script`: JavaScript that is run when the page is there, and the only one
+    that the browser lets run.
+    """
     name, pieces = html.escape(title), "\n".join(body)
+    policy = _POLICY
+    if script:
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+        policy += f"; script-src 'sha256-{digest}'"
+        script = f"<script>{script}</script>\n"
     return f"""<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{name}</title>
 <style>
 {_STYLE}
-</style>
+{style}</style>
 </head>
 <body>
 <h1>{name}</h1>
 {pieces}
-</body>
+{script}</body>
 </html>
 """
 

@@ -33,8 +33,7 @@ def read_decision(path: Path | str, frame: str) -> Decision:
 
     Raises EvaluationError if there is none, there are several, or it is no such file.
     """
-    lines = enumerate(all_lines(path, EvaluationError), start=1)
-    decisions = [_decision(path, number, line) for number, line in lines if line]
+    decisions = [*read_decisions(path)]
     found = [one for one in decisions if one["frame"] == frame] or [
         one for one in decisions if one["frame"].startswith(frame)
     ]
@@ -45,6 +44,12 @@ def read_decision(path: Path | str, frame: str) -> Decision:
     else:
         some = f"no selected frame {frame!r}; the column `selected` of the beliefs tells which are"
     raise EvaluationError(f"{path}: {some}")
+
+
+def read_decisions(path: Path | str) -> Iterator[Decision]:
+    """All lines of a file of `decode --explain`; raises EvaluationError for one that is no decision."""
+    lines = enumerate(all_lines(path, EvaluationError), start=1)
+    return (_decision(path, number, line) for number, line in lines if line)
 
 
 def _decision(path: Path | str, number: int, line: str) -> Decision:
