@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from placerec.cli import experiments, images, learning, models
+from placerec.cli import experiments, images, learning, models, reports
 from placerec.cli.srilm import SRILM_COMMANDS
 from placerec.errors import PlacerecError
 from placerec.version import __version__
@@ -40,7 +40,7 @@ GROUPS = {
         *("learn", "describe", "train-words", "tokenize", "train-lm"),
         *("decode", "evaluate", "calibrate", "update"),
     ),
-    "Look": ("show-words", "show-frame", "stability", "inspect"),
+    "Look": ("report", "show-words", "show-frame", "stability", "inspect"),
     "Language models": ("check", "adapt-lm"),
     "Experiments": ("demo", "lab", "compare", "experiment"),
 }
@@ -86,7 +86,7 @@ def commands() -> None:
     """Which place is the camera in? Images become words, places become language models."""
 
 
-for module in (learning, images, models, experiments):
+for module in (learning, images, models, reports, experiments):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)

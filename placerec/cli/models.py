@@ -316,8 +316,11 @@ def _check_answering(what: str, out: Path | None, options: "Decoding") -> None:
     type=shared.FILE,
     help="Draw beliefs against the truth, what was confused, and how far to trust them: .png, .svg or .pdf.",
 )
+@click.option(
+    "--html", metavar="FILE.html", type=shared.FILE, help="Write the page of `placerec report`, too, without frames."
+)
 @shared.talk_options
-def evaluate(beliefs: tuple[Path, ...], as_json: bool, plot: Path | None) -> None:
+def evaluate(beliefs: tuple[Path, ...], as_json: bool, plot: Path | None, html: Path | None) -> None:
     """Judge beliefs by the true places.
 
     BELIEFS are files of decode (.tsv), folders of them, or `-`. Prints the accuracy beside that of the majority class,
@@ -328,5 +331,11 @@ def evaluate(beliefs: tuple[Path, ...], as_json: bool, plot: Path | None) -> Non
 
     if _STDIN in beliefs and sys.stdin is None:
         raise click.UsageError("`-` reads standard input, and that is closed")
+    if html is not None and _STDIN in beliefs:
+        raise click.UsageError("--html reads the files once more, and standard input is gone then; name files")
     evaluation = evaluate_files(beliefs, plot=plot)
+    if html is not None:
+        from placerec.page.report import report
+
+        report(beliefs, html)
     shared.echo_json(evaluation.to_json()) if as_json else click.echo(format_evaluation(evaluation))

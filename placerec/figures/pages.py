@@ -64,7 +64,7 @@ def html_page(title: str, body: Iterable[str], *, style: str = "", script: str =
     if script:
         digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
         policy += f"; script-src 'sha256-{digest}'"
-        script = f"<script>{script}</script>\n"
+        script = f'<script type="module">{script}</script>\n'
     return f"""<!doctype html>
 <html lang="en">
 <head>

@@ -2,18 +2,18 @@
 
 import base64
 from collections.abc import Iterable, Mapping, Sequence
-from typing import cast
 
 import numpy as np
 
 from placerec.errors import SourceError
-from placerec.frames import Sequence as FrameSequence, images_at
+from placerec.frames import Sequence as FrameSequence
+from placerec.frames.images import picture_at
 from placerec.frames.sequence import Gray
 from placerec.jobs import Progress
 from placerec.page.drives import Drive
 
-# Pixels of the longer side, and WebP's quality: about 1.5 kB a frame.
-_SIDE, _QUALITY = 240, 70
+# The most pixels of height, and WebP's quality: 1 to 5 kB a frame.
+_HEIGHT, _QUALITY = 160, 65
 # How many frames a page holds, of all drives together.
 MOST = 1500
 
@@ -63,16 +63,15 @@ def pictures_of(
         kept = chosen_frames(len(drive.frames), wanted.get(drive.name, ()), most)
         sequence = sequences[drive.name]
         number = {frame.name: index for index, frame in enumerate(sequence.frames)}
-        # In the order of the images, which are read once.
-        order = sorted(kept, key=lambda frame: number[drive.frames[frame]])
         at: dict[int, str] = {}
-        for frame, image in zip(order, images_at(sequence, [number[drive.frames[k]] for k in order]), strict=True):
+        for frame in kept:
+            image = picture_at(sequence, number[drive.frames[frame]], _HEIGHT)
             if not isinstance(image, str):
                 at[frame] = picture_text(image)
             done += 1
             if progress:
                 progress(done, min(total, MOST))
-        made[drive.name] = (sorted(at), [at[frame] for frame in sorted(at)])
+        made[drive.name] = ([*at], [*at.values()])
     return made
 
 
@@ -94,14 +93,10 @@ def _thinned(numbers: list[int], most: int) -> list[int]:
 
 
 def picture_text(image: Gray) -> str:
-    """A grey image (h, w) of 0..255, made small, as what stands in a page in place of a picture's address."""
+    """A picture (h, w) or (h, w, 3) of 0..255 as what stands in a page in place of a picture's address."""
     import cv2
 
-    scale = min(1.0, _SIDE / max(image.shape))
-    if scale < 1:
-        size = max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale))
-        image = cast(Gray, cv2.resize(image, size, interpolation=cv2.INTER_AREA))
-    done, data = cv2.imencode(".webp", np.rint(image).astype(np.uint8), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+    done, data = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
     if not done:
         raise SourceError("OpenCV cannot write WebP here; install the wheel opencv-python-headless")
     return f"data:image/webp;base64,{base64.b64encode(data.tobytes()).decode('ascii')}"
