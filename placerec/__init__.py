@@ -49,6 +49,7 @@ _ROOMS = {
     "placerec.inspection.frame": ("show_frame",),
     "placerec.inspection.word_sheet": ("show_words",),
     "placerec.inspection.word_stability": ("stability",),
+    "placerec.page.report": ("report",),
     "placerec.lab.layout": ("render_lab",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
@@ -83,6 +84,7 @@ if TYPE_CHECKING:
     from placerec.lm.inspect import inspect_model
     from placerec.methods import decode, follow_live, load_decoder
     from placerec.model import Decoding, ModelOptions, calibrate, load_recognizer, train_lm, update
+    from placerec.page.report import report
     from placerec.vision import (
         DescriptorSpec,
         Dictionary,
@@ -145,6 +147,7 @@ __all__ = [
     "read_stream",
     "read_transitions",
     "render_lab",
+    "report",
     "select",
     "show_frame",
     "show_words",
