@@ -167,7 +167,6 @@ def test_classes_of_single_words_are_seen_through(folder: Path) -> None:
     best, other = (re.findall(r"NBEST_\d (-[\d.]+)", text) for text in (plain, out))
     # The first word costs nothing, so only the second word's share of the class is there.
     assert [float(p) for p in other] == pytest.approx([float(p) + math.log10(0.75) for p in best], abs=1e-5)
-    assert call(*arguments, "words.txt", "-classes", "c.classes")[0] == 2
 
 
 def test_models_over_classes_are_mixed_with_fixed_weights(folder: Path) -> None:
@@ -184,3 +183,57 @@ def test_models_over_classes_are_mixed_with_fixed_weights(folder: Path) -> None:
     assert scores == pytest.approx(expected, abs=1e-5)
     status, _, err = call(*arguments, "-mix-lm", "m.lm")
     assert (status, err) == (2, "with -classes only -bayes 0 mixes models while scoring\n")
+
+
+CLASS_MODEL = """
+\\data\\
+ngram 1=6
+ngram 2=5
+
+\\1-grams:
+-0.6\t</s>
+-99\t<s>\t-0.2
+-0.7\tROOM\t-0.1
+-0.8\tHALL\t-0.3
+-1.1\tw4\t-0.15
+-0.9\tcut\t-0.25
+
+\\2-grams:
+-0.4\tROOM cut
+-0.3\tcut HALL
+-0.5\tROOM ROOM
+-0.45\tHALL w4
+-0.35\tw4 cut
+
+\\end\\
+"""
+
+
+def test_events_stand_between_words_of_classes_that_tell_themselves(folder: Path) -> None:
+    Path("c.lm").write_text(CLASS_MODEL)
+    Path("c.classes").write_text("ROOM 0.75 w1\nROOM 0.25 w2\nHALL 1 w3\n")
+    Path("w.txt").write_text("w1 w2 w3 w4\nw2 w2 w1 w3 w3\nw9 w1\n")
+    arguments = ["hidden-ngram", "-lm", "c.lm", "-order", "2", "-hidden-vocab", "e.txt", "-text", "w.txt"]
+    for options in ([], ["-fb", "-posteriors"], ["-nbest", "3"]):
+        results = [call(*arguments, "-classes", "c.classes", *more, *options) for more in ([], ["-simple-classes"])]
+        assert re.sub(r"[-\d.]+", "N", results[0][1]) == re.sub(r"[-\d.]+", "N", results[1][1])
+        numbers = [[float(n) for n in re.findall(r"(?<= )-?\d\S*", out)] for _, out, _ in results]
+        assert numbers[0] == pytest.approx(numbers[1], abs=2e-5)
+
+
+def test_events_stand_between_words_that_classes_explain_in_several_ways(folder: Path) -> None:
+    """All placements of events together, each scored by `ngram -classes`: expansions of two words are cut by none."""
+    Path("c.lm").write_text(CLASS_MODEL)
+    Path("c.classes").write_text("ROOM 0.5 w1\nROOM 0.5 w1 w4\nHALL 0.6 w4\nHALL 0.4 w3 w4\n")
+    words = ["w1", "w4", "w3", "w4"]
+    Path("w.txt").write_text(" ".join(words) + "\n")
+    arguments = ["-order", "4", "-lm", "c.lm", "-classes", "c.classes"]
+    total = 0.0
+    for placed in itertools.product(("", " cut"), repeat=len(words)):
+        Path("one.txt").write_text("".join(f" {word}{event}" for word, event in zip(words, placed, strict=True)))
+        out = call("ngram", *arguments, "-no-sos", "-no-eos", "-debug", "2", "-ppl", "one.txt")[1]
+        scored = [10 ** float(p) for p in re.findall(r"\[ (\S+) \]\n", out)]
+        total += math.prod(scored[1:])
+    status, out, err = call("hidden-ngram", *arguments, "-hidden-vocab", "e.txt", "-text", "w.txt", "-fb", "-totals")
+    assert (status, err) == (0, "")
+    assert float(out) == pytest.approx(math.log10(total), abs=1e-4)

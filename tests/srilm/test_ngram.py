@@ -229,3 +229,42 @@ def test_generated_text_is_reproducible(run: Run) -> None:
     assert len(first.splitlines()) == 20
     continued = run("-lm m.lm -order 2 -gen 2 -seed 5 -gen-prefixes p", p="b x\na\n")[1].splitlines()
     assert [line.split()[0] for line in continued] == ["b", "b", "a", "a"]
+
+
+OTHER = LM.replace(f"{H}\ta b", f"{E}\ta b")
+
+
+@pytest.mark.parametrize("options", ["", "-bayes 0", "-bayes 1", "-order 1", "-debug 2"])
+def test_a_list_of_models_is_mixed_as_options_say(run: Run, options: str) -> None:
+    text = "a b\nb a a\n"
+    command = f"-order 2 -mix-lm o.lm -lambda 0.5 -mix-lm2 m.lm -mix-lambda2 0.2 -ppl t {options}"
+    expected = run(f"-lm m.lm {command}", t=text, **{"o.lm": OTHER})
+    listed = "m.lm -weight 0.5\no.lm -weight 0.3 -type ARPA\n\nm.lm -weight 0.2\n"
+    assert run(f"-lm list -read-mix-lms -order 2 -ppl t {options}", list=listed) == expected
+    assert expected[0] == 0
+
+
+def test_models_of_a_list_have_orders_of_their_own(run: Run) -> None:
+    _, found, _ = run(
+        "-lm list -read-mix-lms -order 2 -bayes 0 -ppl t -debug 2", t="a b\n", list="m.lm -weight 1 -order 1"
+    )
+    assert found == run("-lm m.lm -order 1 -ppl t -debug 2", t="a b\n")[1]
+
+
+@pytest.mark.parametrize(
+    ("listed", "complaint"),
+    [
+        ("m.lm\n", "list: line 1: 'm.lm' is no line"),
+        ("m.lm -weight 0.5\no.lm -weight x\n", "list: line 2: 'o.lm -weight x' is no line"),
+        ("m.lm -weight 1 -type COUNTLM\n", "list: line 1: 'm.lm -weight 1 -type COUNTLM' is no line"),
+        ("m.lm -weight 1 -classes c\n", "list: line 1: 'm.lm -weight 1 -classes c' is no line"),
+        ("m.lm 1\n", "list: line 1: 'm.lm 1' is no line"),
+        ("m.lm -weight 0.5\nm.lm -weight 0.4\n", "list: the weights of 2 models sum to 0.9, not to 1"),
+        ("", "list: the weights of 0 models sum to 0, not to 1"),
+        ("none.lm -weight 1\n", "none.lm: No such file or directory"),
+    ],
+)
+def test_a_list_that_is_none_of_models_is_refused(run: Run, listed: str, complaint: str) -> None:
+    status, out, err = run("-lm list -read-mix-lms -ppl t", t="a\n", list=listed)
+    assert (status, out) == (1, "")
+    assert complaint in err

@@ -218,6 +218,16 @@ class ClassView:
     def _start(self) -> int:
         return self.model.words.index.get("<s>", -1)
 
+    @property
+    def used(self) -> Ints:
+        """How many words before each word count for it, int64 (T,): those that a context's classes may stand for.
+
+        That is exact where words tell their classes; else what stands further back would say more of a context.
+        """
+        longest = max((len(ngram) for ngrams in self.model.definitions.of.values() for ngram in ngrams), default=1)
+        furthest: Ints = np.minimum(self.sequence.place, len(self.model.model.tables.tables) * longest - 1)
+        return furthest
+
     def score(self, words: Ints | None = None) -> Scored:
         """The probabilities of the sequence's words, or of others in their places."""
         if words is None:

@@ -60,7 +60,7 @@ def language_model(
     defaults = {name: option.default for name, option in ngram.OPTIONS.items()}
     own = {name: value for name, value in options.values.items() if name in defaults and name not in kept}
     length = options["bayes"] if options["bayes"] is not None else max(1, options["order"])
-    # What stands around models, and classes of several words, are no options of decoders.
+    # What stands around models is no option of decoders.
     return cast(SightedScorer, Models(Parsed({**defaults, **own, "bayes": length}), words, streams).scorer())
 
 

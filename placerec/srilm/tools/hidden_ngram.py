@@ -11,7 +11,7 @@ from placerec.srilm.model.histories import Histories
 from placerec.srilm.model.trellis import Step, numbered_states
 from placerec.srilm.model.word_map import Choices, Observed, WordMap, read_positions
 from placerec.srilm.text.sentences import Handling
-from placerec.srilm.text.streams import SrilmError, Streams, exit_status, tokens
+from placerec.srilm.text.streams import Streams, exit_status, tokens
 from placerec.srilm.text.vocabulary import WordList, read_aliases, read_words
 from placerec.srilm.tools import decoding, ngram
 from placerec.srilm.tools.decoding import (
@@ -55,8 +55,6 @@ class _Run:
     """One run: the words, the events, the model, and the expected counts."""
 
     def __init__(self, options: Parsed, streams: Streams) -> None:
-        if options["classes"] and not options["simple-classes"]:
-            raise SrilmError("-classes needs -simple-classes here: classes of several words are not supported", 2)
         self.options, self.streams = options, streams
         self.words = WordList(lower=options["tolower"], open_unknown=options["keep-unk"])
         if options["vocab"]:

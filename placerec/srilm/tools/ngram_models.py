@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from functools import cache, partial
-from typing import cast
+from io import BytesIO
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -19,10 +20,50 @@ from placerec.srilm.model.scorers import Model, Null, Scorer
 from placerec.srilm.order.contexts import ContextTimes, merged_times, message_order
 from placerec.srilm.order.messages import Messages
 from placerec.srilm.text.classes_file import format_expansions
-from placerec.srilm.text.streams import SrilmError, Streams
+from placerec.srilm.text.streams import SrilmError, Streams, tokens
 from placerec.srilm.text.vocabulary import WordList
 from placerec.srilm.tools.ngram_classes import expand_classes, read_definitions, with_classes
-from placerec.srilm.tools.options import Parsed
+from placerec.srilm.tools.options import Option, Parsed, parse
+
+# Weights of a list are written with a few digits.
+_ROUNDING = 0.01
+_COMPONENT_OPTIONS = {
+    "weight": Option("float", -1.0),
+    "order": Option("unsigned", 0),
+    "type": Option("string", "ARPA"),
+}
+
+
+class Component(NamedTuple):
+    """A model of a mixture: its file, its weight, and the largest n-gram length that is used of it."""
+
+    name: str
+    weight: float
+    order: int
+
+
+def read_components(name: str, order: int, streams: Streams) -> list[Component]:
+    """The models that a list names (-read-mix-lms): lines `FILE -weight W [-order N] [-type ARPA]`.
+
+    Raises SrilmError for a line without a weight, of which the manual does not say what it means, and for weights that
+    do not sum to 1.
+    """
+    components = []
+    lines = streams.lines(name)
+    for line in lines:
+        file, *settings = tokens(line)
+        complaints = BytesIO()
+        parsed = parse(name, _COMPONENT_OPTIONS, settings, Streams(streams.stdin, streams.stdout, complaints))
+        weight = parsed["weight"]
+        if complaints.getvalue() or parsed.rest or parsed["type"] != "ARPA" or not 0 <= weight <= 1:
+            raise SrilmError(
+                f"{lines.position}{line!r} is no line `FILE -weight W [-order N] [-type ARPA]`, W from 0 to 1"
+            )
+        components.append(Component(file, weight, max(1, parsed["order"] or order)))
+    total = sum(component.weight for component in components)
+    if abs(total - 1) > _ROUNDING:
+        raise SrilmError(f"{name}: the weights of {len(components)} models sum to {total:g}, not to 1")
+    return components
 
 
 class Models:
@@ -56,16 +97,17 @@ class Models:
 
     def backing_off(self) -> Scorer:
         """The back-off model of -lm, and what is mixed with it."""
-        self.mutable, times = self.read("lm", "lm file")
+        components = self.components()
+        self.mutable, times = self.read_component(components[0], "lm file")
         self.times = lambda: times
         if self.options["classes"]:
             self.definitions = read_definitions(self.options, self.words, self.streams)
-        return self.mixed()
+        return self.mixed(components)
 
     def counting(self) -> Scorer:
         """The count model of -lm (-count-lm)."""
         options, name = self.options, self.options["lm"]
-        for other in ("mix-lm", "classes", "renorm", "prune", "prune-lowprobs", "skipoovs"):
+        for other in ("mix-lm", "read-mix-lms", "classes", "renorm", "prune", "prune-lowprobs", "skipoovs"):
             if options[other]:
                 raise SrilmError(f"-{other} needs a back-off model; leave it or -count-lm out", 2)
         failure, limited = f"format error in count-lm file{name}", options["limit-vocab"]
@@ -73,18 +115,18 @@ class Models:
         return self.counted
 
     def read(
-        self, option: str, what: str, *, order: int | None = None, words: WordList | None = None
+        self, name: str, what: str, *, order: int | None = None, words: WordList | None = None, cased: bool = False
     ) -> tuple[MutableModel, ContextTimes]:
-        """Read the model that an option names."""
+        """Read a model; `cased`: messages show words as they are in the file."""
         return read_model(
-            self.options[option],
+            name,
             words or self.words,
             self.streams,
             order=order or self.order,
             debug=self.debug,
             limited=self.options["limit-vocab"] and words is None,
             what=what,
-            cased=option == "prune-history-lm",
+            cased=cased,
         )
 
     def together(self, *mutables: MutableModel) -> list[MutableModel]:
@@ -101,24 +143,33 @@ class Models:
         order = message_order(mutable.trie, times) if times else None
         return Messages(mutable.trie, self.streams, self.debug, numbers=numbers, weighed=order)
 
-    def components(self) -> tuple[list[str], list[float]]:
-        """The options that name models to mix in, and the weights of all models, -lm's first."""
+    def components(self) -> list[Component]:
+        """The models that are mixed, -lm's first."""
         options = self.options
+        if options["read-mix-lms"]:
+            return read_components(options["lm"], self.order, self.streams)
         if not options["mix-lm"]:
-            return [], [1.0]
-        more = [k for k in range(2, 10) if options[f"mix-lm{k}"]]
-        shares = [options[f"mix-lambda{k}"] for k in more]
+            return [Component(options["lm"], 1.0, self.order)]
         rest = 1.0 - options["lambda"] - sum(options[f"mix-lambda{k}"] for k in range(2, 10))
-        return ["mix-lm", *(f"mix-lm{k}" for k in more)], [options["lambda"], rest, *shares]
+        first = [
+            Component(options["lm"], options["lambda"], self.order),
+            Component(options["mix-lm"], rest, self.order),
+        ]
+        more = [k for k in range(2, 10) if options[f"mix-lm{k}"]]
+        return first + [Component(options[f"mix-lm{k}"], options[f"mix-lambda{k}"], self.order) for k in more]
 
-    def mixed(self) -> Scorer:
+    def read_component(self, component: Component, what: str) -> tuple[MutableModel, ContextTimes]:
+        """Read one of the models that are mixed."""
+        return self.read(component.name, what, order=component.order)
+
+    def mixed(self, components: Sequence[Component]) -> Scorer:
         """Static and dynamic mixtures, and what changes the model between them."""
         options = self.options
-        others, weights = self.components()
+        others, weights = components[1:], [component.weight for component in components]
         dynamic = options["bayes"] is not None or options["loglinear-mix"]
         if not dynamic:
-            for k, option in enumerate(others, start=1):
-                read, its = self.read(option, "mix-lm file")
+            for k, component in enumerate(others, start=1):
+                read, its = self.read_component(component, "mix-lm file")
                 self.mutable, other = self.together(self.model(), read)
                 self.times = self.times_merged(self.mutable, other, its)
                 merge(self.mutable, other, merge_weight(weights, k), self.messages(self.mutable))
@@ -128,7 +179,7 @@ class Models:
         model = self.classed(Model(partial(tables_of, self.model(), self.words), self.words, back))
         if not dynamic or not others:
             return model
-        mutables = [self.read(option, "mix-lm file")[0] for option in others]
+        mutables = [self.read_component(component, "mix-lm file")[0] for component in others]
         more = [self.classed(Model(partial(tables_of, mutable, self.words), self.words)) for mutable in mutables]
         if self.definitions is not None and (options["loglinear-mix"] or options["bayes"] > 0):
             raise SrilmError("with -classes only -bayes 0 mixes models while scoring", 2)
@@ -181,7 +232,8 @@ class Models:
         if options["prune"] > 0:
             history = None
             if options["prune-history-lm"]:
-                history, _ = self.read("prune-history-lm", "history LM file", order=max(1, self.order - 1))
+                name, shorter = options["prune-history-lm"], max(1, self.order - 1)
+                history, _ = self.read(name, "history LM file", order=shorter, cased=True)
                 mutable, history = self.together(self.model(), history)
             else:
                 (mutable,) = self.together(self.model())
@@ -208,7 +260,7 @@ class Models:
         """`-rescore-ngram` (section 11.6): another model's n-grams with the probabilities that `scorer` gives them."""
         options = self.options
         own = WordList(lower=options["tolower"], open_unknown=options["unk"])
-        mutable, times = self.read("rescore-ngram", "lm file", words=own)
+        mutable, times = self.read(options["rescore-ngram"], "lm file", words=own)
         self.times = lambda: times
         index, unknown = self.words.index, self.words.index[self.words.unknown]
         numbers = np.array([index.get(word, unknown) for word in mutable.trie.vocabulary.words], np.int64)
