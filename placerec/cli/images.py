@@ -142,16 +142,24 @@ def show_frame(
 @shared.source_arguments
 @shared.words_option(True, "The dictionary of train-words.")
 @shared.dictionary_option
-@shared.seed_option("Seed of the noise.")
+@click.option(
+    "--sample",
+    metavar="N",
+    type=click.IntRange(min=1),
+    default=500,
+    help="Frames to look at, drawn by the seed; all if there are fewer.",
+)
+@shared.seed_option("Seed of the sample and of the noise.")
 @shared.output_option("stability.png", "Draw the table as bars: .png, .svg or .pdf.", required=False)
 @shared.json_option()
+@shared.work_options
 @shared.talk_options
 def stability(sources: tuple[Path, ...], words: Path, out: Path | None, as_json: bool, **how: Any) -> None:
     """Measure how stable the words are.
 
-    SOURCE is what tokenize takes. Every frame is spoilt by JPEG compression, noise, brightness, blur, a shift of one
-    pixel and another resize filter; told is the share of frames that get another word, and how many of these words
-    are next to the right one on the map.
+    SOURCE is what tokenize takes. Frames are spoilt by JPEG compression, noise, brightness, blur, a shift of one pixel
+    and another resize filter; told is the share of frames that get another word, with its interval, and how many of
+    these words are next to the right one on the map.
     """
     from placerec.inspection.word_stability import format_stability, stability as run
 

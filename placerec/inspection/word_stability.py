@@ -1,11 +1,13 @@
 """How stable words are: the share of frames that get another word when a camera's small faults are added to them."""
 
 import logging
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain, groupby
+from itertools import groupby, islice
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any, cast
 
 import cv2
@@ -13,19 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask, Singles
-from placerec.errors import VisionError
+from placerec.errors import SourceError, VisionError
 from placerec.evaluation.summary import percent
 from placerec.figures.canvas import figure_file, picture_file
-from placerec.frames import Frame, Sequence, SourceOptions, all_images, find_sequences
+from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at, read_gray
 from placerec.frames.sequence import Gray
-from placerec.jobs import Progress
+from placerec.jobs import Executor, Progress, workers
 from placerec.vision import Dictionary, DictionarySet
 from placerec.vision.spec import DescriptorSpec, describer, descriptor
 
 log = logging.getLogger(__name__)
 
-# Frames whose descriptors are held at once: each has one a change.
-_CHUNK = 256
+# Frames that are looked at where nothing else is said: the interval of a share is 9 % wide at most.
+SAMPLE = 500
+# Frames that a worker looks at in one go.
+_TOGETHER = 8
+_NONE = -1
 
 # Okabe and Ito's vermilion and sky blue.
 _FAR, _NEAR = "#D55E00", "#56B4E9"
@@ -45,7 +50,8 @@ class Change:
 class ChangeResult:
     """How many frames got another word by a change, and how many of these the word of a unit next to it (of 8).
 
-    Also of pairs of consecutive frames, which tell how much words change anyway.
+    Also of pairs of consecutive frames, which tell how much words change anyway. `of`: the frames that these `frames`
+    were drawn from.
     """
 
     kind: str
@@ -53,18 +59,38 @@ class ChangeResult:
     frames: int
     changed: int
     neighbour: int
+    of: int
 
-    def shares(self) -> dict[str, float | None]:
-        """The shares of 1 of those that changed, None where there are no frames."""
-        counts = {"changed": self.changed, "to_neighbour": self.neighbour}
-        return {name: count / self.frames if self.frames else None for name, count in counts.items()}
+    @property
+    def share(self) -> float:
+        """The share of 1 of those that changed, nan where there are no frames."""
+        return self.changed / self.frames if self.frames else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """What the share of all frames is with 95 % confidence (Wilson's score interval, for a finite population)."""
+        if self.frames >= self.of:
+            return self.share, self.share
+        # As many as would tell as much if there were infinitely many frames to draw from.
+        n = self.frames * (self.of - 1) / (self.of - self.frames)
+        z = NormalDist().inv_cdf(0.975)
+        middle = (self.share + z * z / (2 * n)) / (1 + z * z / n)
+        half = z / (1 + z * z / n) * math.sqrt(self.share * (1 - self.share) / n + z * z / (4 * n * n))
+        return max(0.0, middle - half), min(1.0, middle + half)
+
+    def shares(self) -> dict[str, object]:
+        """The shares of 1 of those that changed, and the interval, None where there are no frames."""
+        if not self.frames:
+            return {"changed": None, "interval": None, "to_neighbour": None}
+        return {"changed": self.share, "interval": list(self.interval), "to_neighbour": self.neighbour / self.frames}
 
 
 @dataclass(frozen=True)
 class Stability:
-    """The result for every change, over `frames` frames, and for the step from a frame to the next."""
+    """The result for every change, over `frames` of `of` frames, and for the step from a frame to the next."""
 
     frames: int
+    of: int
     results: tuple[ChangeResult, ...]
     step: ChangeResult
 
@@ -77,6 +103,7 @@ class Stability:
         """The object that `stability --json` prints; shares are of 1, None where there are no two frames in a row."""
         return {
             "frames": self.frames,
+            "of": self.of,
             "changes": [{"kind": one.kind, "amount": one.amount, **one.shares()} for one in self.results],
             "next_frame": {"steps": self.step.frames, **self.step.shares()},
         }
@@ -90,77 +117,167 @@ def stability(
     name: str = "",
     source_options: SourceOptions = SourceOptions(),
     seed: int = 0,
+    sample: int = SAMPLE,
+    work: Executor | None = None,
     progress: Progress | None = None,
 ) -> Stability:
     """`placerec stability`: how many frames of the sources get another word by what a camera does to pictures.
 
     `out`: the picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first.
-    `seed`: of the noise. Raises SourceError and VisionError for what cannot be read, OutputError for a picture that
-    cannot be written, MissingExtraError without matplotlib.
+    `seed`, `sample`, `work`: see `word_changes`. Raises SourceError and VisionError for what cannot be read,
+    OutputError for a picture that cannot be written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
         dictionary = DictionarySet.load(words).named(name)
-        found = word_changes(find_sequences(sources, options=source_options), dictionary, seed=seed, progress=progress)
+        sequences = find_sequences(sources, options=source_options)
+        found = word_changes(sequences, dictionary, seed=seed, sample=sample, work=work, progress=progress)
         if picture is not None:
             plot_stability(found, picture)
     return found
 
 
 def word_changes(
-    sequences: Iterable[Sequence], dictionary: Dictionary, *, seed: int = 0, progress: Progress | None = None
+    sequences: Iterable[Sequence],
+    dictionary: Dictionary,
+    *,
+    seed: int = 0,
+    sample: int = SAMPLE,
+    work: Executor | None = None,
+    progress: Progress | None = None,
 ) -> Stability:
-    """The words of all frames as they are and after each of CHANGES, compared.
+    """The words of `sample` frames, drawn by `seed`, as they are and after each of CHANGES, compared; of all if fewer.
 
     The picture is changed as the file holds it, in grey and before it is fitted, and stays of 8 bits where it was.
-    Noise is drawn by seed and number of the frame. An image that cannot be read is skipped and named in a warning;
-    VisionError if none can be read, or if the dictionary is of descriptors that were computed elsewhere.
+    Noise is drawn by seed and number of the frame. `work`: who does the work (`jobs.workers`), None for threads; the
+    result does not depend on it. `progress` is called with pictures done and in all. An image that cannot be read is
+    skipped and named in a warning; VisionError if none can be read, or if the dictionary is of descriptors that were
+    computed elsewhere.
     """
     describer(dictionary.spec)
     sequences = list(sequences)
-    total = sum(len(sequence.frames) for sequence in sequences)
-    words: list[Ints] = []
-    kept: list[int] = []
-    rows: list[Singles] = []
-    for number, (frame, image) in enumerate(chain.from_iterable(map(all_images, sequences))):
-        described = _described(frame, image, dictionary.spec, np.random.Generator(np.random.PCG64([seed, number])))
-        if described is not None:
-            rows.append(described)
-            kept.append(number)
-        if rows and (len(rows) == _CHUNK or number == total - 1):
-            words.append(dictionary.words(np.concatenate(rows))[0].reshape(len(rows), -1))
-            rows = []
+    starts = np.cumsum([0, *(len(sequence.frames) for sequence in sequences)])
+    total = int(starts[-1])
+    drawn = np.sort(np.random.Generator(np.random.PCG64(seed)).permutation(total)[:sample])
+    # With the frame after each, of the same sequence.
+    wanted = np.union1d(drawn, np.setdiff1d(drawn + 1, starts))
+    parts = _parts(sequences, starts, wanted, np.isin(wanted, drawn))
+    words = []
+    for found, complaints in (work or workers())(_Look(dictionary, seed), parts):
+        for complaint in complaints:
+            log.warning("%s; the frame is skipped", complaint)
+        words.append(found)
         if progress is not None:
-            progress(number + 1, total)
-    if not kept:
+            progress(sum(map(len, words)), len(wanted))
+    judged = _Judged(np.concatenate(words), wanted, drawn, starts)
+    if not len(judged.rows):
         raise VisionError(f"none of the {total} images can be read; name a folder with images")
-    starts = np.cumsum([len(sequence.frames) for sequence in sequences])
-    sequence_of = np.searchsorted(starts, kept, side="right")
-    return _compared(np.concatenate(words), sequence_of[1:] == sequence_of[:-1], dictionary.training.size)
+    return judged.result(dictionary.training.size)
 
 
-def _compared(words: Ints, follows: Mask, size: int) -> Stability:
-    """words (n, 1 + changes), the unchanged first; follows (n - 1,): whether the next row is of the same sequence."""
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Some frames of one sequence, by their `numbers` int64 (m,) among all, and which are to be `changed`, bool (m,).
 
-    def compared(kind: str, amount: str, before: Ints, after: Ints) -> ChangeResult:
-        # Next to each other on the map, corners included.
-        apart = np.maximum(np.abs(before // size - after // size), np.abs(before % size - after % size))
-        return ChangeResult(kind, amount, len(before), int((apart > 0).sum()), int((apart == 1).sum()))
+    `images`: their grey levels or why there are none; None if each is still in a file of its own.
+    """
 
-    changed = zip(CHANGES, words[:, 1:].T, strict=True)
-    results = tuple(compared(change.kind, change.amount, words[:, 0], after) for change, after in changed)
-    return Stability(len(words), results, compared(_NEXT, "", words[:-1, 0][follows], words[1:, 0][follows]))
+    numbers: Ints
+    changed: Mask
+    frames: tuple[Frame, ...]
+    images: tuple[Gray | str, ...] | None
 
 
-def _described(frame: Frame, gray: Gray | str, spec: DescriptorSpec, rng: np.random.Generator) -> Singles | None:
-    """Descriptors of a frame as it is and after each change, (1 + changes, d); None if it cannot be used."""
-    if isinstance(gray, str):
-        log.warning("%s; the frame is skipped", gray)
-        return None
+def _parts(sequences: list[Sequence], starts: Ints, wanted: Ints, changed: Mask) -> Iterator[_Part]:
+    """The wanted frames with what is to be done to them, a second or so of work each time."""
+    for sequence, start, end in zip(sequences, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        own = slice(*np.searchsorted(wanted, (start, end)).tolist())
+        at = (wanted[own] - start).tolist()
+        images = iter(()) if sequence.recording is None else images_at(sequence, at)
+        for first in range(own.start, own.stop, _TOGETHER):
+            some = slice(first, min(first + _TOGETHER, own.stop))
+            frames = tuple(sequence.frames[number - start] for number in wanted[some].tolist())
+            taken = None if sequence.recording is None else tuple(islice(images, len(frames)))
+            yield _Part(wanted[some], changed[some], frames, taken)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """Looks up the words of frames, in a worker."""
+
+    dictionary: Dictionary
+    seed: int
+
+    def __call__(self, part: _Part) -> tuple[Ints, list[str]]:
+        """The words int64 (m, 1 + changes), _NONE where there are none, and complaints of frames that cannot be read.
+
+        A function of the part alone.
+        """
+        words = np.full((len(part.numbers), 1 + len(CHANGES)), _NONE)
+        complaints = []
+        for k, (frame, number) in enumerate(zip(part.frames, part.numbers.tolist(), strict=True)):
+            rng = np.random.Generator(np.random.PCG64([self.seed, number]))
+            image = None if part.images is None else part.images[k]
+            found = _described(frame, image, self.dictionary.spec, rng if part.changed[k] else None)
+            if isinstance(found, str):
+                complaints.append(found)
+            else:
+                words[k, : len(found)] = self.dictionary.words(found)[0]
+        return words, complaints
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """words int64 (w, 1 + changes) of the frames `wanted` (w,), the unchanged first; `drawn`: the frames to judge."""
+
+    words: Ints
+    wanted: Ints
+    drawn: Ints
+    starts: Ints
+
+    @property
+    def rows(self) -> Ints:
+        """The rows of the frames to judge that could be read."""
+        return self._readable(np.searchsorted(self.wanted, self.drawn))
+
+    def _readable(self, rows: Ints) -> Ints:
+        found: Ints = rows[self.words[rows, 0] != _NONE]
+        return found
+
+    def result(self, size: int) -> Stability:
+        """What came of it, on a map of size x size."""
+        rows, words = self.rows, self.words
+        # With a frame after them, of the same sequence, that could be read, too.
+        before = rows[np.isin(self.wanted[rows] + 1, self.wanted[self._readable(np.arange(len(words)))])]
+        before = before[~np.isin(self.wanted[before] + 1, self.starts)]
+        total, steps = int(self.starts[-1]), int(self.starts[-1]) - len(np.unique(self.starts)) + 1
+        if len(self.drawn) == total:
+            total, steps = len(rows), len(before)
+        changed = zip(CHANGES, words[rows, 1:].T, strict=True)
+        results = tuple(_compared(one.kind, one.amount, words[rows, 0], after, total, size) for one, after in changed)
+        step = _compared(_NEXT, "", words[before, 0], words[before + 1, 0], steps, size)
+        return Stability(len(rows), total, results, step)
+
+
+def _compared(kind: str, amount: str, first: Ints, after: Ints, of: int, size: int) -> ChangeResult:
+    # Next to each other on the map, corners included.
+    apart = np.maximum(np.abs(first // size - after // size), np.abs(first % size - after % size))
+    return ChangeResult(kind, amount, len(first), int((apart > 0).sum()), int((apart == 1).sum()), of)
+
+
+def _described(
+    frame: Frame, image: Gray | str | None, spec: DescriptorSpec, rng: np.random.Generator | None
+) -> Singles | str:
+    """Descriptors of a frame as it is and, with `rng`, after each change, (1 + changes, d); why there are none."""
+    if isinstance(image, str):
+        return image
     try:
-        return np.stack([descriptor(gray, spec), *(descriptor(each.apply(gray, spec, rng), spec) for each in CHANGES)])
+        gray = read_gray(frame.path) if image is None else image
+        changes = () if rng is None else (descriptor(each.apply(gray, spec, rng), spec) for each in CHANGES)
+        return np.stack([descriptor(gray, spec), *changes])
+    except SourceError as error:
+        return str(error)
     except VisionError as error:
-        log.warning("%s: frame %s: %s; the frame is skipped", frame.path, frame.name, error)
-    return None
+        return f"{frame.path}: frame {frame.name}: {error}"
 
 
 def _like(values: NDArray[Any], gray: Gray) -> Gray:
@@ -224,11 +341,18 @@ CHANGES = (
 
 
 def format_stability(found: Stability) -> str:
-    """A line per change: the share of frames whose word changes, and of these the share that stays next to it."""
-    lines = [f"Of {found.frames} frames", f"{'':<32}{'other word':>11}{'a neighbour':>13}{'farther':>9}"]
+    """A line per change: the share of frames whose word changes, its interval, and the share that stays next to it."""
+    drawn = found.frames < found.of
+    head = f"Of {found.frames} frames" + (f", drawn from {found.of}" if drawn else "")
+    lines = [
+        head,
+        f"{'':<32}{'other word':>11}{'95 % interval' * drawn:>{17 * drawn}}{'a neighbour':>13}{'farther':>9}",
+    ]
     for one in found.shown:
         shares = [percent(count / one.frames) for count in (one.changed, one.neighbour, one.changed - one.neighbour)]
-        lines.append(f"{f'{one.kind} {one.amount}'.strip():<32}{shares[0]:>11}{shares[1]:>13}{shares[2]:>9}")
+        low, high = (100 * end for end in one.interval)
+        interval = f"{f'{low:.1f} to {high:.1f} %':>17}" if drawn else ""
+        lines.append(f"{f'{one.kind} {one.amount}'.strip():<32}{shares[0]:>11}{interval}{shares[1]:>13}{shares[2]:>9}")
     return "\n".join(lines)
 
 
@@ -258,5 +382,6 @@ def plot_stability(found: Stability, path: Path | str) -> None:
         axes.set(ylim=(tops[-1] + 0.7, -0.7), xlim=(0, max(10.0, 1.12 * float((near + far).max()))))
         axes.spines[["top", "right", "left"]].set_visible(False)
         axes.set_xlabel("frames whose word changes, %", fontsize=8.5)
-        figure.text(0.02, 1 - 0.4 / height, f"How stable the words of {found.frames} frames are", fontsize=14)
+        drawn = f" (drawn from {found.of})" if found.frames < found.of else ""
+        figure.text(0.02, 1 - 0.4 / height, f"How stable the words of {found.frames} frames{drawn} are", fontsize=14)
         figure.legend(loc="upper left", bbox_to_anchor=(0.01, 1 - 0.5 / height), ncols=2, frameon=False, fontsize=8.5)

@@ -23,12 +23,12 @@ from placerec.vision import DescriptorSpec, DictionaryOptions, train_dictionary
 pytest.importorskip("matplotlib")
 
 RESULTS = (
-    ChangeResult("JPEG", "quality 90", 200, 3, 2),
-    ChangeResult("JPEG", "quality 30", 200, 90, 10),
-    ChangeResult("blur", "x", 200, 0, 0),
+    ChangeResult("JPEG", "quality 90", 200, 3, 2, 200),
+    ChangeResult("JPEG", "quality 30", 200, 90, 10, 200),
+    ChangeResult("blur", "x", 200, 0, 0, 200),
 )
-STEP = ChangeResult("the next frame, for comparison", "", 198, 50, 49)
-FOUND = Stability(200, RESULTS, STEP)
+STEP = ChangeResult("the next frame, for comparison", "", 198, 50, 49, 198)
+FOUND = Stability(200, 200, RESULTS, STEP)
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +189,18 @@ def test_the_table_of_stability() -> None:
         "the next frame, for comparison       25.3 %       24.7 %    0.5 %",
     ]
     assert "next frame" not in format_stability(replace(FOUND, step=replace(STEP, frames=0)))
+
+
+def test_the_table_of_a_sample_has_intervals() -> None:
+    drawn = replace(FOUND, of=1000, results=tuple(replace(one, of=1000) for one in RESULTS))
+    lines = format_stability(replace(drawn, step=replace(STEP, of=990))).splitlines()
+    assert lines[:4] == [
+        "Of 200 frames, drawn from 1000",
+        f"{'':<32} other word    95 % interval  a neighbour  farther",
+        f"{'JPEG quality 90':<32}      1.5 %     0.6 to 3.9 %        1.0 %    0.5 %",
+        f"{'JPEG quality 30':<32}     45.0 %   39.0 to 51.2 %        5.0 %   40.0 %",
+    ]
+    assert {len(line) for line in lines[1:]} == {82}
 
 
 def test_the_picture_of_stability_names_every_change(tmp_path: Path) -> None:

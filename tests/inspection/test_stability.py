@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from helpers.recordings import find_one, pictures, read_images, write_video
 from helpers.small_world import write_images
 from numpy.typing import NDArray
 
@@ -14,6 +15,7 @@ from placerec.frames import Sequence, find_sequences, read_gray
 from placerec.frames.sequence import Gray
 from placerec.inspection import word_stability
 from placerec.inspection.word_stability import CHANGES, Change, ChangeResult, Stability, word_changes
+from placerec.jobs import workers
 from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, descriptor, fit_image
 
 SPEC = DescriptorSpec(image_size=16)
@@ -72,9 +74,60 @@ def test_the_same_seed_gives_the_same_counts_in_pieces_of_any_size(
 ) -> None:
     whole = word_changes(*world)
     told: list[tuple[int, int]] = []
-    monkeypatch.setattr(word_stability, "_CHUNK", 3)
+    monkeypatch.setattr(word_stability, "_TOGETHER", 3)
     assert word_changes(*world, progress=lambda *done: told.append(done)) == whole
-    assert told == [(done, 20) for done in range(1, 21)]
+    assert told == [(done, 20) for done in (3, 6, 9, 10, 13, 16, 19, 20)]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_any_number_of_workers_gives_the_same_counts(world: World, jobs: int) -> None:
+    assert word_changes(*world, work=workers(jobs)) == word_changes(*world)
+
+
+def test_a_sample_is_drawn_by_the_seed_and_judged_as_in_the_whole(world: World) -> None:
+    sequences, dictionary = world
+    found = word_changes(sequences, dictionary, seed=5, sample=7)
+    drawn = np.sort(np.random.Generator(np.random.PCG64(5)).permutation(20)[:7]).tolist()
+    assert (found.frames, found.of) == (7, 20)
+    assert {(result.frames, result.of) for result in found.results} == {(7, 20)}
+    assert (found.step.frames, found.step.of) == (len(set(drawn) - {9, 19}), 18)
+    words = []
+    for number in drawn:
+        gray = read_gray([frame for sequence in sequences for frame in sequence.frames][number].path)
+        rng = np.random.Generator(np.random.PCG64([5, number]))
+        rows = [descriptor(gray, SPEC), *(descriptor(each.apply(gray, SPEC, rng), SPEC) for each in CHANGES)]
+        words.append([int(dictionary.words(values[None])[0][0]) for values in rows])
+    for column, result in enumerate(found.results, start=1):
+        assert result.changed == sum(row[0] != row[column] for row in words)
+    assert word_changes(sequences, dictionary, seed=6, sample=7) != found
+    assert word_changes(sequences, dictionary, seed=5, sample=20) == word_changes(sequences, dictionary, seed=5)
+
+
+def test_a_sample_of_a_recording_is_that_of_its_images(world: World, tmp_path: Path) -> None:
+    video = find_one(write_video(tmp_path / "run.mp4", frames=pictures(20)))
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for number, gray in enumerate(read_images(video)):
+        assert not isinstance(gray, str)
+        cv2.imwrite(str(folder / f"{number:03d}.png"), gray)
+    whole, found = (word_changes([one], world[1], sample=6) for one in (*find_sequences([folder]), video))
+    assert found == whole
+
+
+def test_the_interval_holds_the_share_of_all_frames_as_often_as_it_says() -> None:
+    """A share of all frames that is known, and samples of it."""
+    rng = np.random.Generator(np.random.PCG64(0))
+    of, changed = 1000, 130
+    for frames in (50, 500):
+        drawn = rng.hypergeometric(changed, of - changed, frames, 4000)
+        ends = np.array([ChangeResult("", "", frames, int(k), 0, of).interval for k in range(frames + 1)])
+        held = (ends[drawn, 0] <= changed / of) & (changed / of <= ends[drawn, 1])
+        assert held.mean() == pytest.approx(0.95, abs=0.02)
+        assert (np.diff(ends, axis=1) >= 0).all()
+    assert ChangeResult("", "", 500, 0, 0, 1000).interval[0] == 0
+    assert ChangeResult("", "", 500, 500, 0, 1000).interval[1] == 1
+    low, high = ChangeResult("", "", word_stability.SAMPLE, word_stability.SAMPLE // 2, 0, 10**9).interval
+    assert high - low < 0.09
 
 
 def test_an_image_that_cannot_be_read_is_skipped_and_named(
@@ -93,11 +146,13 @@ def test_an_image_that_cannot_be_read_is_skipped_and_named(
 
 
 def test_json_has_shares() -> None:
-    found = Stability(4, (ChangeResult("noise", "sigma 2", 4, 2, 1),), ChangeResult("next", "", 0, 0, 0))
+    found = Stability(4, 4, (ChangeResult("noise", "sigma 2", 4, 2, 1, 4),), ChangeResult("next", "", 0, 0, 0, 0))
+    shares = {"changed": 0.5, "interval": [0.5, 0.5], "to_neighbour": 0.25}
     assert found.to_json() == {
         "frames": 4,
-        "changes": [{"kind": "noise", "amount": "sigma 2", "changed": 0.5, "to_neighbour": 0.25}],
-        "next_frame": {"steps": 0, "changed": None, "to_neighbour": None},
+        "of": 4,
+        "changes": [{"kind": "noise", "amount": "sigma 2", **shares}],
+        "next_frame": {"steps": 0, "changed": None, "interval": None, "to_neighbour": None},
     }
 
 
