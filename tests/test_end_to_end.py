@@ -43,6 +43,11 @@ def files(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
+def kept(folder: Path) -> list[str]:
+    """The descriptors of two sequences that commands keep for each other: of fewer than 64 frames each."""
+    return [str(path.relative_to(folder)) for path in (folder / ".placerec-cache/described").iterdir()]
+
+
 def test_the_files_are_the_promised_ones(results: Path) -> None:
     assert files(results) == sorted(
         ["words.npz", "evaluation.json", "beliefs/lap2.tsv"]
@@ -51,7 +56,9 @@ def test_the_files_are_the_promised_ones(results: Path) -> None:
         + [f"model/{place}.arpa" for place in PLACES]
         + [f"model/sentences/{place}.txt" for place in PLACES]
         + [f"model/counts/{place}.counts" for place in PLACES]
+        + kept(results)
     )
+    assert len(kept(results)) == 2
 
 
 def test_tokens_are_a_line_per_frame_in_time_order(results: Path, laps: Path) -> None:
