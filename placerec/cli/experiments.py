@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from placerec.cli import shared
 
@@ -20,6 +21,8 @@ from placerec.cli import shared
     help="What to test on; left out of TRAIN if it is there.  [repeatable]",
 )
 @click.option("--methods", metavar="A,B,...", help="Only these methods.  [default: all]")
+@shared.words_option(False, "Your own dictionaries, where they are not to be learned from TRAIN.")
+@shared.matrix_option
 @shared.size_option(20)
 @shared.seed_option("Another seed, another map.")
 @click.option(
@@ -33,7 +36,15 @@ from placerec.cli import shared
     "out/", "The folder to write: methods.csv, pairs.csv, methods.png and .svg, beliefs/; a second run goes on there."
 )
 @shared.talk_options
-def compare(train: tuple[Path, ...], tests: tuple[Path, ...], methods: str | None, out: Path, **how: Any) -> None:
+def compare(
+    train: tuple[Path, ...],
+    tests: tuple[Path, ...],
+    methods: str | None,
+    out: Path,
+    words: Path | None,
+    matrix: Path | None,
+    **how: Any,
+) -> None:
     """Run every method on the same test sequences.
 
     TRAIN and SEQUENCE are labelled sequences (of images, videos, bags), or folders of them. Each method learns from
@@ -42,9 +53,11 @@ def compare(train: tuple[Path, ...], tests: tuple[Path, ...], methods: str | Non
     from placerec.experiments.comparison.results import format_comparison
     from placerec.experiments.comparison.run import check_methods, compare as run
 
+    if words and click.get_current_context().get_parameter_source("size") is not ParameterSource.DEFAULT:
+        raise click.UsageError("--size is of dictionaries that are learned, and -w names some; leave it out")
     with shared.usage("--methods"):
-        chosen = check_methods(None if methods is None else methods.split(","))
-    found = run(train, tests, out, methods=chosen, progress=shared.progress_bar, **how)
+        chosen = check_methods(None if methods is None else methods.split(","), described=matrix is None)
+    found = run(train, tests, out, methods=chosen, words=words, matrix=matrix, progress=shared.progress_bar, **how)
     click.echo(format_comparison(found))
 
 

@@ -118,6 +118,23 @@ def describe_all(
     return described
 
 
+def keep_given(
+    sequences: Sequence[FrameSequence], spec: DescriptorSpec | None, matrix: Path | str, cache: Path
+) -> list[Described]:
+    """Sequences that are described by a matrix that was computed elsewhere, `vision.describe` tells of which kind.
+
+    `spec`: what the descriptors are to be, None for whatever the matrix holds. Raises VisionError for a matrix that
+    cannot be used, and ExperimentError for a sequence without a row.
+    """
+    found = describe(sequences, spec, matrix=matrix)
+    described = []
+    for one, own in _by_sequence(found, sequences, f"{matrix} has no row for its frames"):
+        digest = key_of("given", own.values, list(own.table.names))
+        described.append(Described(one, found.spec, cache / "descriptors" / f"{digest}.npz"))
+        _keep(described[-1], own)
+    return described
+
+
 def _key(sequence: FrameSequence, spec: DescriptorSpec) -> str:
     """A digest of a sequence's images; labels, times and names may change without them."""
     how = sequence.recording and repr(sequence.recording)
@@ -136,16 +153,28 @@ def _usable(one: Described) -> bool:
 def _describe(
     some: Sequence[Described], spec: DescriptorSpec, work: Executor | None, progress: Progress | None
 ) -> None:
-    found = describe([one.sequence for one in some], spec, work=work, progress=progress)
+    sequences = [one.sequence for one in some]
+    found = describe(sequences, spec, work=work, progress=progress)
+    for one, (_, own) in zip(some, _by_sequence(found, sequences, "none of its images can be read"), strict=True):
+        _keep(one, own)
+
+
+def _by_sequence(
+    found: Descriptors, sequences: Sequence[FrameSequence], reason: str
+) -> Iterator[tuple[FrameSequence, Descriptors]]:
+    """The descriptors of each sequence; ExperimentError that tells the `reason` for one without any."""
     rows = found.table.by_sequence()
-    for one in some:
-        if one.sequence.name not in rows:
-            raise ExperimentError(f"{one.sequence.source}: none of its images can be read; leave the sequence out")
-        own = found.take(rows[one.sequence.name])
-        # Equal names in one sequence cannot be.
-        number = {frame.name: k for k, frame in enumerate(one.sequence.frames)}
-        kept = np.array([number[name] for name in own.table.names], np.int64)
-        write_npz(one.kept, {"descriptors": own.values, "rows": kept}, {})
+    for one in sequences:
+        if one.name not in rows:
+            raise ExperimentError(f"{one.source}: {reason}; leave the sequence out")
+        yield one, found.take(rows[one.name])
+
+
+def _keep(one: Described, own: Descriptors) -> None:
+    # Equal names in one sequence cannot be.
+    number = {frame.name: k for k, frame in enumerate(one.sequence.frames)}
+    kept = np.array([number[name] for name in own.table.names], np.int64)
+    write_npz(one.kept, {"descriptors": own.values, "rows": kept}, {})
 
 
 @dataclass(frozen=True)

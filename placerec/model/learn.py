@@ -5,7 +5,7 @@ transitions. That costs as many trainings as there are groups of sequences, and 
 """
 
 import logging
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -23,7 +23,7 @@ from placerec.journal import open_journal
 from placerec.model.evidence import chosen, count_places, group_borders, held_out
 from placerec.model.folder import TOKENS, LearnedEvidence, ModelFolder, owned_by
 from placerec.model.options import ModelOptions
-from placerec.model.train import keep_evidence, train_folder
+from placerec.model.train import learn_evidence, train_folder
 from placerec.vision import DescriptorSpec, DictionarySet, DictionarySetOptions, describe
 from placerec.vision.chunks import Source
 from placerec.vision.describe import keep_described
@@ -90,13 +90,25 @@ def learn_folder(
     made = DictionarySet.fit(values, spec=spec, places=table.places, options=words, work=work)
     names = tuple(table.by_sequence())
     made = DictionarySet(tuple(replace(one, sequences=names) for one in made.dictionaries))
-    made.save(folder.words)
+    weigh = partial(learn_weights_anew, values, table, spec, made.options, options, work)
+    return learn_models(folder, values, table, made, options, weigh)
+
+
+def learn_models(
+    folder: ModelFolder,
+    values: Source,
+    table: FrameTable,
+    dictionaries: DictionarySet,
+    options: ModelOptions,
+    weigh: Callable[[], Weights] | None = None,
+) -> LearnedEvidence:
+    """`learn_folder` with dictionaries that are there; `weigh`: as for `train_lm`."""
+    dictionaries.save(folder.words)
     tokens = folder.path / TOKENS
     tokens.mkdir()
-    fill_folder(streams_of_rows(values, table, made), made, tokens)
+    fill_folder(streams_of_rows(values, table, dictionaries), dictionaries, tokens)
     records = train_folder(folder, [tokens], options)
-    weights = learn_weights_anew(values, table, spec, made.options, options, work)
-    return keep_evidence(folder, records, weights, words=True)
+    return learn_evidence(folder, records, [tokens], options, weigh)
 
 
 def learn_weights_anew(

@@ -58,8 +58,7 @@ def train_lm(
         records = train_folder(folder, tokens, options, vocabulary, names, work, progress)
         evidence = None
         if not as_in_paper and not holds_sentences(tokens):
-            weights = weigh() if weigh else _weights_of_tokens(folder, tokens, names, options)
-            evidence = keep_evidence(folder, records, weights, words=weigh is not None)
+            evidence = learn_evidence(folder, records, tokens, options, weigh)
     log.info("%s: %d places, order %d, %s", out, len(records[FIRST].places), options.order, options.smoothing)
     if evidence is not None:
         log.info("%s", evidence)
@@ -97,24 +96,25 @@ def train_folder(
     return {name: record for name, (_, record) in gathered.items()}
 
 
-def _weights_of_tokens(
-    folder: ModelFolder, tokens: Sequence[Path | str], dictionaries: Sequence[str], options: ModelOptions
-) -> Weights:
-    """The weights of words that token streams alone tell, given the folder of their models."""
-    vocabularies = {name: read_vocabulary(folder.of(name).vocabulary) for name in dictionaries}
-    return learn_weights([partial(read_stream, path) for path in stream_files(tokens)], vocabularies, options)
-
-
-def keep_evidence(
-    folder: ModelFolder, records: Mapping[str, Record], weights: Weights, *, words: bool
+def learn_evidence(
+    folder: ModelFolder,
+    records: Mapping[str, Record],
+    tokens: Sequence[Path | str],
+    options: ModelOptions,
+    weigh: Callable[[], Weights] | None = None,
 ) -> LearnedEvidence:
-    """Write into a folder of models how much words weigh, and what that was learned from, which is returned.
+    """Learn how much words weigh, and write it into the folder of their models, of which `records` tells.
 
-    `records`: those of the models' training, by dictionary. `words`: whether words were redone for it, too.
+    `tokens`: the token streams that the models were made of, which tell the weights without `weigh`, see `train_lm`.
     """
+    if weigh is None:
+        vocabularies = {name: read_vocabulary(folder.of(name).vocabulary) for name in records}
+        weights = learn_weights([partial(read_stream, path) for path in stream_files(tokens)], vocabularies, options)
+    else:
+        weights = weigh()
     fingerprints = {name: record.dictionary for name, record in records.items()}
     first = records[FIRST]
-    evidence = LearnedEvidence(weights, len(first.sequences), first.frames, fingerprints, words)
+    evidence = LearnedEvidence(weights, len(first.sequences), first.frames, fingerprints, weigh is not None)
     folder.describe(evidence=evidence.as_dict())
     return evidence
 

@@ -54,6 +54,17 @@ def test_what_cannot_be_compared_is_one_line(
     assert not (tmp_path / "out").exists()
 
 
+def test_own_words_have_their_size(runs: Path, tmp_path: Path) -> None:
+    words = tmp_path / "words.npz"
+    assert placerec("train-words", runs / "run0", runs / "run1", "--sizes", "2", "-o", words).exit_code == 0
+    arguments = ["compare", runs, "--test", runs / "run2", "--methods", "hohmm,wu2009", "-w", words]
+    done = placerec(*arguments, "-o", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    done = placerec(*arguments, "--size", 20, "-o", tmp_path / "other")
+    assert done.exit_code == 2
+    assert "--size is of dictionaries that are learned, and -w names some; leave it out" in done.stderr
+
+
 def test_a_test_sequence_is_needed(runs: Path, tmp_path: Path) -> None:
     done = placerec("compare", runs, "-o", tmp_path / "out")
     assert done.exit_code == 2

@@ -92,7 +92,7 @@ def test_the_table_for_a_terminal_is_straight(done: tuple[Path, Comparison]) -> 
     header, *lines, last = format_comparison(done[1]).splitlines()
     assert {line.index("%") for line in lines} == {header.index("accuracy") + len("accuracy") - 1}
     assert [line.split()[0] for line in lines] == [
-        score.method for score in sorted(done[1].scores, key=lambda score: -score.accuracy)
+        score.method for score in sorted(done[1].scores, key=lambda score: (-score.accuracy, score.method))
     ]
     assert last.startswith("24 frames; always 'hall'")
 

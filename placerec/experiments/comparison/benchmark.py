@@ -3,6 +3,7 @@
 A method is added in COMPARED alone: how it is fitted and run, what it is made of, and what it needs.
 """
 
+import math
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
@@ -15,7 +16,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import EvaluationError, SourceError, VisionError
-from placerec.experiments.comparison.several import SeveralDictionaries
+from placerec.experiments.comparison.several import SeveralDictionaries, microseconds_of_words
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.frames import Sequence as FrameSequence, images_at
 from placerec.frames.sequence import Gray
@@ -66,7 +67,10 @@ PLAIN, NORMALISED = VIEWS
 
 @dataclass(frozen=True)
 class FrontEndCost:
-    """Microseconds that a frame takes before any method sees it: for its descriptor, and from that to its word."""
+    """Microseconds that a frame takes before any method sees it: for its descriptor, and from that to its word.
+
+    `descriptor` is nan where that was computed elsewhere.
+    """
 
     descriptor: float
     word: float
@@ -90,12 +94,12 @@ class EncodedSequences:
         return np.array([number[word] for word in self.streams[sequence].words], np.int64)
 
 
-def encode(job: WordsJob, views: Container[str]) -> EncodedSequences:
-    """Learn the words of a job, and give all frames of the job theirs, and their components: PLAIN, and of `views`.
+def encode(job: WordsJob, dictionary: Dictionary, views: Container[str]) -> EncodedSequences:
+    """Give all frames of a job their words and their components: PLAIN, and of `views`.
 
     Raises VisionError or SourceError for images, and EvaluationError for labels that give no place-normalised view.
     """
-    dictionary, training = job.dictionary(), len(job.train)
+    training = len(job.train)
     found = [one.load() for one in (*job.train, *job.test)]
     streams = tuple(stream for one in found for stream in tokens_of(one, dictionary))
     points = {PLAIN: tuple(project(one.values, dictionary.pca) for one in found)}
@@ -117,15 +121,17 @@ def _cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dictionary) -
     kept = load(path)
     if kept:
         return FrontEndCost(**kept)
-    spent, timed = np.zeros(2), 0
-    for gray in _spread_images(sequences, tests):
-        started = perf_counter()
-        row = descriptor(gray, dictionary.spec)[None]
-        described = perf_counter()
-        dictionary.words(row)
-        spent += described - started, perf_counter() - described
-        timed += 1
-    cost = FrontEndCost(*(1e6 * spent / timed).tolist())
+    if dictionary.spec.kind == "npy":
+        cost = FrontEndCost(math.nan, microseconds_of_words(dictionary, tests))
+    else:
+        spent = []
+        for gray in _spread_images(sequences, tests):
+            started = perf_counter()
+            row = descriptor(gray, dictionary.spec)[None]
+            described = perf_counter()
+            dictionary.words(row)
+            spent.append((described - started, perf_counter() - described))
+        cost = FrontEndCost(*(1e6 * np.mean(spent, axis=0)).tolist())
     save(path, asdict(cost))
     return cost
 

@@ -1,5 +1,6 @@
 """The picture of a comparison: a row per method, the best on top, with the accuracy's interval and the cost beside."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -155,10 +156,12 @@ def _caption(found: Comparison) -> list[str]:
     number, what = found.drawn
     over = f"{number} test sequences" if what == "sequences" else f"the {number} visits of one sequence"
     few = f" Fewer than {LEAST}: no method can be told from another." if number < LEAST else ""
+    own = found.cost.descriptor
+    described = "computed elsewhere" if math.isnan(own) else f"{own / 1000:.1f} ms"
     lines = [
         f"Intervals: bootstrap over {over}.{few} Bold: the best, and those whose difference to it may be chance.",
         "Cost: one frame at a time, from its word or its components to the belief; before, each needs the descriptor "
-        f"({found.cost.descriptor / 1000:.1f} ms) and its components or word ({found.cost.word:.0f} µs).",
+        f"({described}) and its components or word ({found.cost.word:.0f} µs).",
     ]
     for score in found.scores:
         if score.consulted is not None:

@@ -9,8 +9,9 @@ OUT/cache/                  what a second run does not do again: descriptors, wo
 
 import json
 import logging
-from collections.abc import Iterable
-from dataclasses import replace
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from placerec.errors import EvaluationError, SourceError, check_optional
@@ -20,7 +21,6 @@ from placerec.experiments.comparison.benchmark import (
     SEVERAL_WORDS,
     TWO_WORDS,
     Benchmark,
-    EncodedSequences,
     MethodRun,
     encode,
     train_models,
@@ -28,7 +28,7 @@ from placerec.experiments.comparison.benchmark import (
 from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
 from placerec.experiments.comparison.several import learn_several
-from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, load
+from placerec.experiments.store import Described, WordsJob, describe_all, held_output, keep_given, key_of, load
 from placerec.figures.canvas import check_figure
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence, SourceOptions, find_sequences
@@ -36,15 +36,30 @@ from placerec.frames.doubts import warn_of_still_sequences, warn_of_strange_labe
 from placerec.frames.naming import own_name, unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
 from placerec.jobs import ProgressBar, silent
-from placerec.vision import DescriptorSpec, DictionaryOptions
+from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, DictionarySet
+from placerec.vision.pca import is_orthonormal
 
 # Of the dictionary that methods use, and of a second one for those that ask for it.
-SPECS = (DescriptorSpec(), DescriptorSpec(kind="centrist"))
+SPEC, SECOND = DescriptorSpec(), DescriptorSpec(kind="centrist")
 # The larger of the paper's two maps, with which it recognises rooms better.
 SIZE = 20
 RUN_JSON = "run.json"
 OWNED = ("*.tsv", RUN_JSON)
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What is compared: `every` sequence in the order in which the sources name them, and which of these test.
+
+    `words`: one's own dictionaries, `matrix`: descriptors that were computed elsewhere; None where there are none.
+    """
+
+    training: list[FrameSequence]
+    tests: list[FrameSequence]
+    every: list[FrameSequence]
+    words: DictionarySet | None = None
+    matrix: Path | None = None
 
 
 def compare(
@@ -53,6 +68,8 @@ def compare(
     out: Path | str,
     *,
     methods: Iterable[str] | None = None,
+    words: Path | str | None = None,
+    matrix: Path | str | None = None,
     size: int = SIZE,
     seed: int = 0,
     source_options: SourceOptions = SourceOptions(),
@@ -61,49 +78,33 @@ def compare(
 ) -> Comparison:
     """Learn on the sequences of `train` that `test` does not name, run every method on those of `test`, write `out`.
 
-    `size`, `seed`: of the dictionaries; the seed also draws prototypes and the bootstrap. What an earlier run into
-    `out` has done on the same data is kept; `cache`: the folder for it, by default in `out`. `progress(label)` is a
-    context manager that gives a callback(done, total). Raises EvaluationError for an unknown method and for sequences
-    that nothing can be compared on, MissingExtraError for what is not installed, and what `find_sequences` raises.
+    `words`: a words.npz whose dictionaries `hohmm` uses, all others that of the view `plain` that comes first there;
+    without it they are learned from the training sequences, `size` being that of all methods but `hohmm`. `matrix`: a
+    .npy or .npz file of descriptors that were computed elsewhere (`vision.external`); the rows of a .npy are those of
+    the sequences as `train` names them, and then of those that `test` alone does. `seed`: of dictionaries, prototypes
+    and the bootstrap. What an earlier run into `out` has done on the same data is kept; `cache`: the folder for it, by
+    default in `out`. `progress(label)` is a context manager that gives a callback(done, total). Raises EvaluationError
+    for an unknown method and for what nothing can be compared on, MissingExtraError for what is not installed,
+    VisionError for `words` and a `matrix` that cannot be used, and what `find_sequences` raises.
     """
-    chosen = check_methods(methods)
+    chosen = check_methods(methods, described=matrix is None)
     for name in chosen:
         if package := COMPARED[name].package:
             check_optional(package, name, "leave it out of --methods")
     out = Path(out)
     check_figure(out / "methods.png")
-    training, tests = _split(train, test, source_options)
-    labels = [[frame.place for frame in sequence.frames] for sequence in tests]
-    warn_of_still_sequences(labels)
-    warn_of_strange_labels(labels, sorted({frame.place for one in training for frame in one.frames} - {""}))
+    own = None if words is None else _own_words(Path(words), described=matrix is None)
+    given = replace(_split(train, test, source_options), words=own, matrix=None if matrix is None else Path(matrix))
+    _doubt(given)
     cache = out / "cache" if cache is None else Path(cache)
     with held_output(out, cache):
-        encoded: list[EncodedSequences] = []
-        jobs: list[WordsJob] = []
-        for spec in SPECS[: 1 + any(COMPARED[name].kind == TWO_WORDS for name in chosen)]:
-            with progress(f"describe ({spec.kind})") as show:
-                described = describe_all([*training, *tests], spec, cache, progress=show)
-                both = tuple(described[: len(training)]), tuple(described[len(training) :])
-                if not encoded:
-                    learned = {one.kept for one in both[0]}
-                    warn_of_training(
-                        [one.sequence.name for one in both[1] if one.kept in learned], "words and the models"
-                    )
-                job = WordsJob(*both, DictionaryOptions(size=size, seed=seed), cache)
-                encoded.append(encode(job, () if encoded else {COMPARED[name].view for name in chosen}))
-                jobs.append(job)
-        several = None
-        if any(COMPARED[name].kind == SEVERAL_WORDS for name in chosen):
-            several = learn_several(jobs[0], seed)
-        models = train_models(encoded[0], len(training), cache)
-        second = encoded[1] if len(encoded) > 1 else None
-        benchmark = Benchmark(encoded[0], len(training), models, seed, second, several)
+        benchmark = _benchmark(given, chosen, size, seed, cache, progress)
         runs = {}
         with progress("methods") as show:
             for done, name in enumerate(chosen, start=1):
                 runs[name] = _method_run(name, benchmark, out / "beliefs" / name)
                 show(done, len(chosen))
-        found = judge(runs, encoded[0].cost, seed)
+        found = judge(runs, benchmark.encoded.cost, seed)
         write_text(out / "methods.csv", format_methods(found.scores))
         write_text(out / "pairs.csv", format_pairs(found.pairs))
         for suffix in (".png", ".svg"):
@@ -112,24 +113,84 @@ def compare(
     return found
 
 
-def check_methods(methods: Iterable[str] | None = None) -> list[str]:
-    """The methods in the order of the table, all of them for None; EvaluationError for an unknown one or none."""
-    names = set(COMPARED if methods is None else methods)
+def _own_words(path: Path, described: bool) -> DictionarySet:
+    """One's own dictionaries, if methods can use them on descriptors that are computed here (`described`), or not."""
+    words = DictionarySet.load(path)
+    if described and words.spec.kind == "npy":
+        raise EvaluationError(f"{path}: is of descriptors that were computed elsewhere; --descriptor npy:FILE has them")
+    if _plain(words) is None:
+        raise EvaluationError(f"{path}: has no dictionary of the view plain, which most methods use; learn one, too")
+    return words
+
+
+def _plain(words: DictionarySet) -> Dictionary | None:
+    """The dictionary that methods of one dictionary use."""
+    return next((one for one in words.dictionaries if is_orthonormal(one.pca)), None)
+
+
+def _doubt(given: _Given) -> None:
+    labels = [[frame.place for frame in sequence.frames] for sequence in given.tests]
+    warn_of_still_sequences(labels)
+    warn_of_strange_labels(labels, sorted({frame.place for one in given.training for frame in one.frames} - {""}))
+    if given.words is not None:
+        warn_of_training([one.name for one in given.tests if one.name in given.words.sequences], "words")
+
+
+def _benchmark(
+    given: _Given, methods: Sequence[str], size: int, seed: int, cache: Path, progress: ProgressBar
+) -> Benchmark:
+    """What the methods are run on: descriptors, words and models."""
+
+    def described(spec: DescriptorSpec) -> list[Described]:
+        with progress(f"describe ({spec.kind})") as show:
+            return describe_all(given.every, spec, cache, progress=show)
+
+    def job(every: list[Described]) -> WordsJob:
+        of = {one.sequence.name: one for one in every}
+        training, tests = (tuple(of[one.name] for one in part) for part in (given.training, given.tests))
+        return WordsJob(training, tests, DictionaryOptions(size=size, seed=seed), cache)
+
+    spec = given.words.spec if given.words else None
+    first = job(described(spec or SPEC) if given.matrix is None else keep_given(given.every, spec, given.matrix, cache))
+    learned = {one.kept for one in first.train}
+    warn_of_training([one.sequence.name for one in first.test if one.kept in learned], "words and the models")
+    dictionary = _plain(given.words) if given.words else None
+    encoded = encode(first, dictionary or first.dictionary(), {COMPARED[name].view for name in methods})
+    kinds = {COMPARED[name].kind for name in methods}
+    second = None
+    if TWO_WORDS in kinds:
+        other = job(described(SECOND))
+        second = encode(other, other.dictionary(), ())
+    several = learn_several(first, seed, given.words) if SEVERAL_WORDS in kinds else None
+    training = len(given.training)
+    return Benchmark(encoded, training, train_models(encoded, training, cache), seed, second, several)
+
+
+def check_methods(methods: Iterable[str] | None = None, *, described: bool = True) -> list[str]:
+    """The methods in the order of the table, all of them for None; EvaluationError for an unknown one or none.
+
+    Unless frames are `described` here, no method can ask for a second descriptor.
+    """
+    asking = [] if described else [name for name in COMPARED if COMPARED[name].kind == TWO_WORDS]
+    names = set(COMPARED.keys() - asking if methods is None else methods)
     choice = f"choose from {', '.join(COMPARED)}"
     if unknown := sorted(names.difference(COMPARED)):
         raise EvaluationError(f"no method is called {unknown[0]!r}; {choice}")
     if not names:
         raise EvaluationError(f"no method is named; {choice}")
+    if known := sorted(names.intersection(asking)):
+        raise EvaluationError(
+            f"{known[0]} describes images itself, and the descriptors come from elsewhere; leave it out"
+        )
     return [name for name in COMPARED if name in names]
 
 
-def _split(
-    train: Iterable[Path | str], test: Iterable[Path | str], source_options: SourceOptions
-) -> tuple[list[FrameSequence], list[FrameSequence]]:
+def _split(train: Iterable[Path | str], test: Iterable[Path | str], source_options: SourceOptions) -> _Given:
     """The sequences to learn from and to test on, under names that are unique among both."""
     testing = find_sequences(test, options=source_options)
     left_out = {sequence.source.resolve() for sequence in testing}
-    learning = [s for s in find_sequences(train, options=source_options) if s.source.resolve() not in left_out]
+    named = find_sequences(train, options=source_options)
+    learning = [s for s in named if s.source.resolve() not in left_out]
     if not learning:
         raise EvaluationError("every sequence is a test sequence, and none is left to learn from; name others")
     both = [*learning, *testing]
@@ -150,7 +211,8 @@ def _split(
         )
     if not any(frame.place for sequence in tests for frame in sequence.frames):
         raise EvaluationError(f"no frame of {tests[0].source} has a label, so nothing can be judged; label the tests")
-    return training, tests
+    order = {sequence.source.resolve(): number for number, sequence in reversed([*enumerate([*named, *testing])])}
+    return _Given(training, tests, sorted(both, key=lambda one: order[one.source.resolve()]))
 
 
 def _method_run(name: str, benchmark: Benchmark, folder: Path) -> MethodRun:
@@ -187,11 +249,9 @@ def _tell(out: Path, found: Comparison) -> None:
         log.info("%s: %d methods; intervals over %d test sequences", out, len(found.scores), number)
     if number < LEAST:
         log.warning("no difference between methods can hold with fewer than %d test %s", LEAST, what)
-    log.info(
-        "before every method a frame takes %.1f ms to describe and %.0f us to find its word, reading not counted",
-        found.cost.descriptor / 1000,
-        found.cost.word,
-    )
+    describing = "" if math.isnan(found.cost.descriptor) else f"{found.cost.descriptor / 1000:.1f} ms to describe and "
+    what = f"{describing}{found.cost.word:.0f} us to find its word, reading not counted"
+    log.info("before every method a frame takes %s", what)
     for score in found.scores:
         if score.consulted is not None:
             log.info("%s asked its second dictionary for %.0f %% of the frames", score.method, 100 * score.consulted)
