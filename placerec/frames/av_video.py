@@ -1,6 +1,6 @@
 """Videos that OpenCV's wheel cannot decode (AV1), and videos in pieces, as cameras send them, through PyAV.
 
-Frames are decoded by one thread, and turned and made grey as OpenCV's are.
+Frames are decoded by one thread, and turned and made grey as OpenCV's are, or left in their colours.
 """
 
 from array import array
@@ -12,26 +12,26 @@ from pathlib import Path
 from typing import Any
 
 from placerec.errors import SourceError
-from placerec.frames.image import as_gray
-from placerec.frames.sequence import Frame, Gray
+from placerec.frames.image import as_gray, as_image
+from placerec.frames.sequence import Frame, Gray, Image, shown_pixels
 from placerec.frames.video import SAME, Video
 
-# Of a frame that was decoded, given its name: the grey levels, or why there are none.
-Decoded = Callable[[str], Gray | str]
+# Of a frame that was decoded, given its name, and whether colours are wanted: the image, or why there is none.
+Decoded = Callable[[str, bool], Image | str]
 
 
 @dataclass(frozen=True)
 class AvVideo(Video):
     """A `Video` that is decoded by PyAV."""
 
-    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0, *, colours: bool = False) -> Iterator[tuple[Frame, Image | str]]:
         for position, decoded in _decoded(self.path, self.times):
             index, between = divmod(position - self.start, self.every)
             if between or index < first:
                 continue
             if index >= len(self.listed):
                 return
-            yield self.listed[index], decoded(f"{self.path}: frame {self.listed[index].name}")
+            yield self.listed[index], decoded(f"{self.path}: frame {self.listed[index].name}", colours)
 
     def picture(self, index: int) -> Gray | str:
         """The frame at `index` for people to look at, (h, w, 3), or why there is none."""
@@ -48,7 +48,7 @@ class AvVideo(Video):
                         return as_gray(_colours(frame), f"{self.path}: frame {self.listed[index].name}")
                     if found > seconds:
                         break
-        return next(gray for _, gray in self.frames(index))
+        return next(shown_pixels(image) for _, image in self.frames(index, colours=True))
 
 
 def can_decode(path: Path) -> bool:
@@ -80,7 +80,7 @@ def decode_pieces(codec: str, pieces: Iterable[bytes]) -> Iterator[tuple[int, De
         for frame in frames:
             if frame.pts is not None and done <= frame.pts:
                 yield from ((lost, _no_frame) for lost in range(done, frame.pts))
-                yield frame.pts, partial(_gray, frame)
+                yield frame.pts, partial(_image, frame)
                 done = frame.pts + 1
 
     for number, piece in enumerate(pieces):
@@ -106,7 +106,7 @@ def _decoded(path: Path, times: "array[float]") -> Iterator[tuple[int, Decoded]]
             found = bisect_left(times, seconds - SAME)
             if done <= found < len(times) and times[found] - seconds <= SAME:
                 yield from ((lost, _no_frame) for lost in range(done, found))
-                yield found, partial(_gray, frame)
+                yield found, partial(_image, frame)
                 done = found + 1
     yield from ((lost, _no_frame) for lost in range(done, len(times)))
 
@@ -125,11 +125,9 @@ def _frames(container: Any) -> Iterator[Any]:
         yield from (frame for frame in frames if frame.pts is not None)
 
 
-def _gray(frame: Any, name: str) -> Gray | str:
-    import cv2
-
+def _image(frame: Any, name: str, colours: bool) -> Image | str:
     try:
-        return as_gray(cv2.cvtColor(_colours(frame), cv2.COLOR_BGR2GRAY), name)
+        return as_image(_colours(frame), name, colours=colours)
     except SourceError as error:
         return str(error)
 
@@ -140,5 +138,5 @@ def _colours(frame: Any) -> Any:
     return np.ascontiguousarray(np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90)))
 
 
-def _no_frame(name: str) -> str:
+def _no_frame(name: str, colours: bool) -> str:
     return f"{name} cannot be decoded"

@@ -16,8 +16,8 @@ from placerec.arrays import Ints
 from placerec.errors import PlacerecError, SourceError, check_optional
 from placerec.frames.av_video import Decoded, decode_pieces
 from placerec.frames.bag_reader import Codec, codec_of, is_ros1, opened, reason_of, stored_messages
-from placerec.frames.ros_image import DEPTH, codec_in, gray_of, unreadable
-from placerec.frames.sequence import EPOCH, Frame, Gray
+from placerec.frames.ros_image import DEPTH, codec_in, image_of, unreadable
+from placerec.frames.sequence import EPOCH, Frame, Gray, Image, shown_pixels
 
 SUFFIXES = (".bag", ".db3", ".mcap")
 METADATA = "metadata.yaml"
@@ -47,7 +47,7 @@ class Bag:
     def files(self) -> list[Path]:
         return sorted(path for path in self.path.iterdir() if path.is_file()) if self.path.is_dir() else [self.path]
 
-    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0, *, colours: bool = False) -> Iterator[tuple[Frame, Image | str]]:
         waiting: dict[int, Decoded] = {}
         number = first
         with opened(self.path) as reader:
@@ -58,7 +58,7 @@ class Bag:
                     waiting[index] = decoded
                 while number in waiting:
                     frame = self.listed[number]
-                    yield frame, waiting.pop(number)(f"{self.path}: frame {frame.name} of {self.topic}")
+                    yield frame, waiting.pop(number)(f"{self.path}: frame {frame.name} of {self.topic}", colours)
                     number += 1
                 if number == len(self.listed):
                     return
@@ -68,7 +68,7 @@ class Bag:
     def picture(self, index: int) -> Gray | str:
         """The frame at `index`, or why there is none; of images nothing before it is read."""
         if self.codec:
-            return next(gray for _, gray in self.frames(index))
+            return next(shown_pixels(image) for _, image in self.frames(index, colours=True))
         place = self.ranks.index(self.start + index * self.every)
         when = self.stored[place]
         # Messages that were stored at one nanosecond are told by their order.
@@ -76,19 +76,19 @@ class Bag:
         name = f"{self.path}: frame {self.listed[index].name} of {self.topic}"
         with opened(self.path) as reader:
             for codec, _, data in islice(stored_messages(reader, self.path, self.topic, when), before, None):
-                return _gray(codec, data, name)
+                return shown_pixels(_image(codec, data, name, False))
         return f"{name} cannot be read again"
 
     def _decoded(self, messages: Iterator[tuple[Codec, int, bytes]]) -> Iterator[tuple[int, Decoded]]:
-        """What gives the grey levels of each message, in the order of storing."""
+        """What gives the image of each message, in the order of storing."""
         if not self.codec:
-            return enumerate(partial(_gray, codec, data) for codec, _, data in messages)
+            return enumerate(partial(_image, codec, data) for codec, _, data in messages)
         return decode_pieces(self.codec, (_piece(codec, data) for codec, _, data in messages))
 
 
-def _gray(codec: Codec, data: bytes, name: str) -> Gray | str:
+def _image(codec: Codec, data: bytes, name: str, colours: bool) -> Image | str:
     try:
-        return gray_of(codec.parse(data), codec.kind, name)
+        return image_of(codec.parse(data), codec.kind, name, colours=colours)
     except PlacerecError as error:
         return str(error)
     except Exception as error:  # Of what a damaged message makes the parser raise there is no list.

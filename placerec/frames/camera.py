@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -20,8 +21,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from placerec.errors import SourceError
 from placerec.frames.image import quiet
 from placerec.frames.live import LatestFrameQueue, LiveFrame, Stopped, ended_by_interrupt
-from placerec.frames.sequence import Frame, Gray, Sequence, SourceOptions
-from placerec.frames.video import grabbed_gray
+from placerec.frames.sequence import Frame, Gray, Image, Sequence, SourceOptions
+from placerec.frames.video import grabbed_image
 
 if TYPE_CHECKING:
     import cv2
@@ -58,12 +59,12 @@ class Camera:
         address = re.sub(r"^\w+://([^/@]*@)?|[?#].*", "", self.source)
         return re.sub(r"[^\w.-]+", "-", address).strip("-.") or "camera"
 
-    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0, *, colours: bool = False) -> Iterator[tuple[Frame, Image | str]]:
         """The frames from now on, until the camera gives no more or Ctrl-C is pressed; `first` must be 0.
 
         Raises SourceError if the camera cannot be opened, or never gives an image.
         """
-        queue = LatestFrameQueue(self.live_frames, room=HELD)
+        queue = LatestFrameQueue(partial(self.live_frames, colours=colours), room=HELD)
         told = False
         with closing(queue), ended_by_interrupt(queue):
             for number, live in enumerate(queue):
@@ -83,8 +84,8 @@ class Camera:
         """None: nothing of a camera is there twice."""
         return []
 
-    def live_frames(self, stopped: Stopped) -> Iterator[LiveFrame]:
-        """Frames as they come, on the thread that asks for them.
+    def live_frames(self, stopped: Stopped, *, colours: bool = False) -> Iterator[LiveFrame]:
+        """Frames as they come, on the thread that asks for them; `colours`: each with a `ColourImage`.
 
         Raises SourceError for a camera that cannot be opened, or never gives an image.
         """
@@ -99,7 +100,7 @@ class Camera:
                         continue
                     frame = Frame(f"{position:06d}", began + came, "", self.path)
                     name = f"{self}: frame {frame.name}"
-                    image = grabbed_gray(capture, name) if good else f"{name} cannot be decoded"
+                    image = grabbed_image(capture, name, colours=colours) if good else f"{name} cannot be decoded"
                     yield LiveFrame(position // self.every, frame, image, came)
         if began is None and not stopped():
             raise SourceError(f"{self}: gives no image; look whether another program uses it, and whether it is on")

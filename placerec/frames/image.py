@@ -1,4 +1,7 @@
-"""An encoded image -> grey levels. Damage is looked for before decoding: OpenCV gives half a picture and no error."""
+"""An encoded image -> grey levels, and colours if they are wanted.
+
+Damage is looked for before decoding: OpenCV gives half a picture and no error.
+"""
 
 import re
 import stat
@@ -14,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
-from placerec.frames.sequence import Gray
+from placerec.frames.sequence import ColourImage, Colours, Gray, Image
 
 # cv2 is imported where it is used: listing frames must not cost its import.
 
@@ -45,6 +48,11 @@ def read_gray(path: Path | str) -> Gray:
     Raises SourceError naming the file and the reason: missing, unreadable, a pipe, and what `decode_gray` refuses.
     """
     return decode_gray(_bytes_of(Path(path)), str(path))
+
+
+def read_image(path: Path | str, *, colours: bool = False) -> Image:
+    """What `decode_image` makes of an image file; raises what `read_gray` raises."""
+    return decode_image(_bytes_of(Path(path)), str(path), colours=colours)
 
 
 def read_colours(path: Path | str, height: int) -> Gray:
@@ -93,6 +101,22 @@ def decode_gray(data: bytes, name: str) -> Gray:
     return as_gray(_decode(name, _checked(data, name), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH), name)
 
 
+def decode_image(data: bytes, name: str, *, colours: bool = False) -> Image:
+    """What `decode_gray` gives; with `colours` a `ColourImage`, for which the colours are decoded apart.
+
+    Colours of 16 bits are scaled as grey levels are, by the depth that holds their own greatest value, and rounded;
+    a grey image has three equal channels.
+    """
+    import cv2
+
+    gray = decode_gray(data, name)
+    if not colours:
+        return gray
+    # Grey levels made of the colours would be others.
+    pixels = _decode(name, _checked(data, name), cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
+    return ColourImage(gray, as_colours(pixels, name))
+
+
 def _checked(data: bytes, name: str) -> bytes:
     """What is given to the decoder; SourceError for what is known not to be whole, or too large."""
     if not data:
@@ -117,6 +141,27 @@ def as_gray(pixels: NDArray[Any], name: str) -> Gray:
     if pixels.dtype != np.uint8:
         raise SourceError(f"{name}: has pixels of type {pixels.dtype}; save it with 8 or 16 bits a channel")
     return pixels
+
+
+def as_colours(pixels: NDArray[Any], name: str) -> Colours:
+    """Decoded pixels, grey (h, w) or blue, green, red (h, w, 3), as (h, w, 3) of 0..255; SourceError as `as_gray`."""
+    import cv2
+
+    levels: NDArray[Any] = pixels if pixels.dtype == np.float32 else as_gray(pixels, name)
+    if levels.dtype != np.uint8:
+        levels = np.rint(levels).clip(0, 255).astype(np.uint8)
+    return levels if levels.ndim == 3 else np.asarray(cv2.cvtColor(levels, cv2.COLOR_GRAY2BGR), np.uint8)
+
+
+def as_image(pixels: NDArray[Any], name: str, *, colours: bool = False) -> Image:
+    """Decoded pixels, grey (h, w) or blue, green, red (h, w, 3), as grey levels; with `colours` a `ColourImage`.
+
+    Raises SourceError as `as_gray` does.
+    """
+    import cv2
+
+    gray = as_gray(pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), name)
+    return ColourImage(gray, as_colours(pixels, name)) if colours else gray
 
 
 def _decode(name: str, data: bytes, flags: int) -> NDArray[Any]:

@@ -15,26 +15,26 @@ from numpy.typing import NDArray
 
 from placerec.errors import SourceError
 from placerec.files import content_digest
-from placerec.frames.image import read_colours, read_gray
-from placerec.frames.sequence import Frame, Gray, Sequence
+from placerec.frames.image import read_colours, read_image
+from placerec.frames.sequence import Frame, Gray, Image, Sequence
 
 BATCH = 64  # half a second of work
 
 
-def images_at(sequence: Sequence, indices: Ordered[int]) -> Iterator[Gray | str]:
+def images_at(sequence: Sequence, indices: Ordered[int], *, colours: bool = False) -> Iterator[Image | str]:
     """The grey levels of the frames at `indices`, which ascend, or the reason why there are none.
 
-    A recording is read in one pass, from the first to the last of them.
+    `colours`: a `ColourImage` of each. A recording is read in one pass, from the first to the last of them.
     """
     if sequence.recording is None:
-        yield from (_read(sequence.frames[index]) for index in indices)
+        yield from (_read(sequence.frames[index], colours) for index in indices)
     elif indices:
-        rest = sequence.recording.frames(indices[0])
+        rest = sequence.recording.frames(indices[0], colours=colours)
         here = indices[0]
         for index in indices:
-            _, gray = next(islice(rest, index - here, None))
+            _, image = next(islice(rest, index - here, None))
             here = index + 1
-            yield gray
+            yield image
 
 
 def picture_at(sequence: Sequence, index: int, height: int) -> Gray | str:
@@ -61,11 +61,11 @@ def picture_at(sequence: Sequence, index: int, height: int) -> Gray | str:
     return pixels.clip(0, 255).astype(np.uint8)
 
 
-def all_images(sequence: Sequence) -> Iterator[tuple[Frame, Gray | str]]:
-    """Every frame of a sequence with its grey levels, or the reason why it has none."""
+def all_images(sequence: Sequence, *, colours: bool = False) -> Iterator[tuple[Frame, Image | str]]:
+    """Every frame of a sequence with its grey levels, with `colours` a `ColourImage`, or the reason why it has none."""
     if sequence.recording is None:
-        return ((frame, _read(frame)) for frame in sequence.frames)
-    return sequence.recording.frames()
+        return ((frame, _read(frame, colours)) for frame in sequence.frames)
+    return sequence.recording.frames(colours=colours)
 
 
 def files_of(sequence: Sequence) -> list[Path]:
@@ -79,26 +79,27 @@ def files_of(sequence: Sequence) -> list[Path]:
 class Batch:
     """Some consecutive frames of a sequence. `first`: the index of the first of them there.
 
-    `images`: their grey levels, or why there are none; None if each is still in a file of its own. `known`: what was
-    found of the frames before, for which their images are not needed; None if nothing was.
+    `images`: their grey levels or colours, or why there are none; None if each is still in a file of its own. `known`:
+    what was found of the frames before, for which their images are not needed; None if nothing was.
     """
 
     sequence: str
     first: int
     frames: tuple[Frame, ...]
-    images: tuple[Gray | str, ...] | None = None
+    images: tuple[Image | str, ...] | None = None
     known: bytes | None = None
 
 
-def batches(sequences: Iterable[Sequence]) -> Iterator[tuple[Sequence, Batch]]:
+def batches(sequences: Iterable[Sequence], *, colours: bool = False) -> Iterator[tuple[Sequence, Batch]]:
     """All frames, in order, in batches of one sequence each; of recordings, without the images.
 
-    Only the frames of an endless recording come with their images, for they are not known before.
+    Only the frames of an endless recording come with their images, for they are not known before; `colours`: a
+    `ColourImage` of each.
     """
     for sequence in sequences:
         recording = sequence.recording
         if recording is not None and recording.endless:
-            rest = recording.frames()
+            rest = recording.frames(colours=colours)
             first = 0
             while some := tuple(islice(rest, BATCH)):
                 frames, images = zip(*some, strict=True)
@@ -110,19 +111,19 @@ def batches(sequences: Iterable[Sequence]) -> Iterator[tuple[Sequence, Batch]]:
 
 
 def with_images(
-    listed: Iterable[tuple[Sequence, Batch]], shrink: Callable[[Gray | str], Gray | str]
+    listed: Iterable[tuple[Sequence, Batch]], shrink: Callable[[Image | str], Image | str], *, colours: bool = False
 ) -> Iterator[Batch]:
     """The batches, those of recordings with their images, which are read in one pass where nothing is known between.
 
-    `shrink` makes them smaller, so that little is kept and sent.
+    `shrink` makes them smaller, so that little is kept and sent. `colours`: a `ColourImage` of each.
     """
-    rest: Iterator[tuple[Frame, Gray | str]] = iter(())
+    rest: Iterator[tuple[Frame, Image | str]] = iter(())
     current = ("", 0)
     for sequence, batch in listed:
         images = batch.images
         if sequence.recording is not None and images is None and batch.known is None:
             if current != (sequence.name, batch.first):
-                rest = sequence.recording.frames(batch.first)
+                rest = sequence.recording.frames(batch.first, colours=colours)
             current = (sequence.name, batch.first + len(batch.frames))
             found = {frame.name: shrink(image) for frame, image in islice(rest, len(batch.frames))}
             images = tuple(found.get(frame.name, f"{frame.path}: frame {frame.name} is gone") for frame in batch.frames)
@@ -139,9 +140,9 @@ def content_key(sequence: Sequence, batch: Batch) -> str:
     return content_digest(whole, [(os.path.abspath(path), _state(path)) for path in files])
 
 
-def _read(frame: Frame) -> Gray | str:
+def _read(frame: Frame, colours: bool) -> Image | str:
     try:
-        return read_gray(frame.path)
+        return read_image(frame.path, colours=colours)
     except SourceError as error:
         return str(error)
 

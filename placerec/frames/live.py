@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from placerec.errors import SourceError
-from placerec.frames.sequence import Frame, Gray
+from placerec.frames.sequence import Frame, Image
 
 Stopped = Callable[[], bool]
 
@@ -24,11 +24,11 @@ _TWICE = 1.0
 
 @dataclass(frozen=True, slots=True)
 class LiveFrame:
-    """Frame `number` (from 0), its grey levels or the reason why it has none, and when it came by time.monotonic()."""
+    """Frame `number` (from 0), its image or the reason why it has none, and when it came by time.monotonic()."""
 
     number: int
     frame: Frame
-    image: Gray | str
+    image: Image | str
     came: float
 
 
@@ -88,7 +88,7 @@ class LatestFrameQueue:
                 self._news.notify()
 
 
-def real_time(frames: Iterable[tuple[Frame, Gray | str]], stopped: Stopped) -> Iterator[LiveFrame]:
+def real_time(frames: Iterable[tuple[Frame, Image | str]], stopped: Stopped) -> Iterator[LiveFrame]:
     """A recording as if it happened now: every frame comes so long after the first as its time stamp says.
 
     The next frame is read before it is due. Raises SourceError for a frame without a time.

@@ -1,4 +1,4 @@
-"""Messages of images, as ROS has them, as grey levels: raw ones of every encoding, and compressed ones."""
+"""Messages of images, as ROS has them, as grey levels and colours: raw ones of every encoding, and compressed ones."""
 
 import re
 from typing import Any
@@ -8,12 +8,19 @@ from numpy.typing import NDArray
 
 from placerec.arrays import Singles
 from placerec.errors import SourceError
-from placerec.frames.image import as_gray, decode_gray
-from placerec.frames.sequence import Gray
+from placerec.frames.image import as_colours, as_gray, decode_image
+from placerec.frames.sequence import ColourImage, Colours, Gray, Image
 
 RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 
-_PLANAR = ("nv12", "nv21", "yuv420", "i420", "yv12")
+# OpenCV's conversions to blue, green, red.
+_PLANAR = {
+    "nv12": "YUV2BGR_NV12",
+    "nv21": "YUV2BGR_NV21",
+    "yuv420": "YUV2BGR_I420",
+    "i420": "YUV2BGR_I420",
+    "yv12": "YUV2BGR_YV12",
+}
 # encoding -> channels, bytes a channel, OpenCV's conversion to grey ("" where the one channel is grey already).
 _ENCODINGS = {
     "mono8": (1, 1, ""),
@@ -53,28 +60,57 @@ _CODECS = {
 _VIDEO = re.compile(r"(?i)\b(h\.?26[45]|avc1?|hevc|av1|vp[89])\b")
 
 
-def gray_of(message: Any, kind: str, name: str) -> Gray:
-    """The grey levels 0..255 of a message of type `kind`.
+def image_of(message: Any, kind: str, name: str, *, colours: bool = False) -> Image:
+    """The grey levels 0..255 of a message of type `kind`; with `colours` a `ColourImage`.
 
-    16 bits as in `decode_gray`; 32FC1: what is no positive number is 0, and 1, or the greatest value if that is more,
+    16 bits as in `decode_image`; 32FC1: what is no positive number is 0, and 1, or the greatest value if that is more,
     becomes 255. Raises SourceError that begins with `name` for an encoding that is not read and for missing data.
     """
     data = np.asarray(message.data)
     if kind == COMPRESSED:
-        return decode_gray(data.tobytes()[_DEPTH_HEADER if DEPTH in message.format else 0 :], name)
+        encoded = data.tobytes()[_DEPTH_HEADER if DEPTH in message.format else 0 :]
+        return decode_image(encoded, name, colours=colours)
     if message.encoding == "32FC1":
-        return _of_floats(_pixels(message, data, 1, "f4", name)[..., 0], name)
+        levels = _of_floats(_pixels(message, data, 1, "f4", name)[..., 0], name)
+        return ColourImage(levels, as_colours(levels, name)) if colours else levels
     if message.encoding not in _ENCODINGS:
         raise SourceError(f"{name} has {_unknown_encoding(message.encoding)}")
-    import cv2
-
     channels, size, conversion = _ENCODINGS[message.encoding]
     pixels = _pixels(message, data, channels, f"u{size}", name)
-    if not conversion:
-        return as_gray(pixels[..., 0], name)
-    if min(pixels.shape[:2]) > 1:
-        pixels = cv2.cvtColor(pixels[..., 0] if channels == 1 else pixels, getattr(cv2, f"COLOR_{conversion}"))
-    return as_gray(pixels, name)
+    gray = as_gray(_converted(pixels, conversion), name)
+    if not colours:
+        return gray
+    if message.encoding in _PLANAR:
+        return ColourImage(gray, _of_planes(message, data, pixels[..., 0], name))
+    # What a camera writes as blue, green, red is that already.
+    coloured = "" if conversion == "BGR2GRAY" else conversion.replace("GRAY", "BGR")
+    return ColourImage(gray, as_colours(_converted(pixels, coloured), name))
+
+
+def _converted(pixels: NDArray[Any], conversion: str) -> NDArray[Any]:
+    """The pixels (h, w, channels) after OpenCV's conversion, if there is one and they are enough for it."""
+    import cv2
+
+    found = pixels[..., 0] if pixels.shape[2] == 1 else pixels
+    if not conversion or min(found.shape[:2]) < 2:
+        return found
+    return cv2.cvtColor(found, getattr(cv2, f"COLOR_{conversion}"))
+
+
+def _of_planes(message: Any, data: NDArray[np.uint8], levels: NDArray[np.uint8], name: str) -> Colours:
+    """The colours of a picture whose grey levels (h, w) come first, and behind them those of every 2 x 2 pixels."""
+    import cv2
+
+    height, width = levels.shape
+    step, conversion = int(message.step), _PLANAR[message.encoding]
+    # Two values a row of one plane; or a plane for each, whose rows are half as long.
+    rows, row = (height // 2, width) if conversion.startswith("NV", 8) else (height, width // 2)
+    behind = data[height * step :]
+    if height % 2 or width % 2 or step % 2 or len(behind) < height * step // 2:
+        raise SourceError(f"{name} is damaged: {width}x{height} pixels in rows of {step} bytes have no whole colours")
+    chroma = behind[: height * step // 2].reshape(rows, -1)[:, :row]
+    planes = np.concatenate([levels.reshape(-1), chroma.reshape(-1)]).reshape(height * 3 // 2, width)
+    return as_colours(cv2.cvtColor(planes, getattr(cv2, f"COLOR_{conversion}")), name)
 
 
 def _pixels(message: Any, data: NDArray[np.uint8], channels: int, kind: str, name: str) -> NDArray[Any]:

@@ -13,8 +13,33 @@ from numpy.typing import NDArray
 from placerec.errors import SourceError
 
 Gray = NDArray[np.uint8 | np.float32]
+Colours = NDArray[np.uint8]
 # The seconds since 1970 in 2001: what is less counts from something else, as from the start of a robot or a simulation.
 EPOCH = 10**9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColourImage:
+    """An image in colours: `colours` (h, w, 3) blue, green, red of 0..255.
+
+    `gray` (h, w): byte for byte what is read where nobody wants colours.
+    """
+
+    gray: Gray
+    colours: Colours
+
+
+Image = Gray | ColourImage
+
+
+def gray_levels(image: Image) -> Gray:
+    """The grey levels (h, w) of an image that may be in colours."""
+    return image.gray if isinstance(image, ColourImage) else image
+
+
+def shown_pixels(image: Image | str) -> Gray | str:
+    """The colours (h, w, 3) of an image, its grey levels (h, w) if it has none, or the reason why there is none."""
+    return image.colours if isinstance(image, ColourImage) else image
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +65,11 @@ class Recording(Protocol):
     @property
     def endless(self) -> bool: ...
 
-    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
-        """The frames in order from index `first`, each with its grey levels 0..255 or the reason why it has none."""
+    def frames(self, first: int = 0, *, colours: bool = False) -> Iterator[tuple[Frame, Image | str]]:
+        """The frames in order from index `first`, each with its grey levels 0..255 or the reason why it has none.
+
+        `colours`: with a `ColourImage` in place of the grey levels.
+        """
 
     def picture(self, index: int) -> Gray | str:
         """The frame at `index` for people to look at, in colours, (h, w, 3) blue, green, red, where that costs nothing;

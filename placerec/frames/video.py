@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from placerec.errors import SourceError
-from placerec.frames.image import as_gray, quiet
-from placerec.frames.sequence import Frame, Gray
+from placerec.frames.image import as_gray, as_image, quiet
+from placerec.frames.sequence import Frame, Gray, Image, shown_pixels
 
 SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".flv", ".ogv", ".3gp", ".mts")
 # Streams without a container, and without times.
@@ -64,7 +64,7 @@ class Video:
     def files(self) -> list[Path]:
         return [self.path]
 
-    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0, *, colours: bool = False) -> Iterator[tuple[Frame, Image | str]]:
         if first >= len(self.listed):
             return
         with _opened(self.path) as capture:
@@ -73,7 +73,10 @@ class Video:
                 if between or index < first:
                     continue
                 name = f"{self.path}: frame {self.listed[index].name}"
-                yield self.listed[index], grabbed_gray(capture, name) if decoded else f"{name} cannot be decoded"
+                if decoded:
+                    yield self.listed[index], grabbed_image(capture, name, colours=colours)
+                else:
+                    yield self.listed[index], f"{name} cannot be decoded"
                 if index == len(self.listed) - 1:
                     return
 
@@ -89,7 +92,7 @@ class Video:
                     decoded, picture = capture.retrieve()
                 if decoded:
                     return as_gray(picture, f"{self.path}: frame {self.listed[index].name}")
-        return next(gray for _, gray in self.frames(index))
+        return next(shown_pixels(image) for _, image in self.frames(index, colours=True))
 
 
 def is_video(path: Path) -> bool:
@@ -228,16 +231,14 @@ def _decoded(capture: Any, times: "array[float]", *, late: bool) -> Iterator[tup
     yield from ((missing, False) for missing in range(done, len(times)))
 
 
-def grabbed_gray(capture: Any, name: str) -> Gray | str:
-    """The grey levels of the frame that was grabbed last, or the reason why it has none, which begins with `name`."""
-    import cv2
-
+def grabbed_image(capture: Any, name: str, *, colours: bool = False) -> Image | str:
+    """The frame that was grabbed last, grey or in colours, or why there is none, beginning with `name`."""
     with quiet():
         decoded, picture = capture.retrieve()
     if not decoded:
         return f"{name} cannot be decoded"
     try:
-        return as_gray(picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), name)
+        return as_image(picture, name, colours=colours)
     except SourceError as error:
         return str(error)
 

@@ -19,7 +19,7 @@ from placerec.errors import SourceError, VisionError
 from placerec.evaluation.summary import percent
 from placerec.figures.canvas import figure_file, picture_file
 from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at, read_gray
-from placerec.frames.sequence import Gray
+from placerec.frames.sequence import Gray, Image, gray_levels
 from placerec.jobs import Executor, Progress, workers
 from placerec.vision import Dictionary, DictionarySet
 from placerec.vision.spec import DescriptorSpec, describer, descriptor
@@ -184,7 +184,7 @@ class _Part:
     numbers: Ints
     changed: Mask
     frames: tuple[Frame, ...]
-    images: tuple[Gray | str, ...] | None
+    images: tuple[Image | str, ...] | None
 
 
 def _parts(sequences: list[Sequence], starts: Ints, wanted: Ints, changed: Mask) -> Iterator[_Part]:
@@ -265,13 +265,13 @@ def _compared(kind: str, amount: str, first: Ints, after: Ints, of: int, size: i
 
 
 def _described(
-    frame: Frame, image: Gray | str | None, spec: DescriptorSpec, rng: np.random.Generator | None
+    frame: Frame, image: Image | str | None, spec: DescriptorSpec, rng: np.random.Generator | None
 ) -> Singles | str:
     """Descriptors of a frame as it is and, with `rng`, after each change, (1 + changes, d); why there are none."""
     if isinstance(image, str):
         return image
     try:
-        gray = read_gray(frame.path) if image is None else image
+        gray = read_gray(frame.path) if image is None else gray_levels(image)
         changes = () if rng is None else (descriptor(each.apply(gray, spec, rng), spec) for each in CHANGES)
         return np.stack([descriptor(gray, spec), *changes])
     except SourceError as error:

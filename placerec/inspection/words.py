@@ -11,7 +11,7 @@ from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import SourceError
 from placerec.evaluation.summary import percent, shorten
 from placerec.frames import Sequence, SourceOptions, find_sequences, images_at
-from placerec.frames.sequence import Gray
+from placerec.frames.sequence import Gray, gray_levels
 from placerec.frames.table import FrameTable
 from placerec.jobs import Progress
 from placerec.vision import Descriptors, Dictionary, describe
@@ -162,7 +162,7 @@ def typical_images(
         for k, image in zip(chosen, images_at(sequence, chosen), strict=True):
             if isinstance(image, str):
                 raise SourceError(image)
-            found[unit_of[sequence.name, sequence.frames[k].name]] = _preview(image)
+            found[unit_of[sequence.name, sequence.frames[k].name]] = _preview(gray_levels(image))
     return found
 
 

@@ -17,6 +17,7 @@ from placerec.frames import Frame, Sequence, SourceOptions, find_sequences
 from placerec.frames.camera import Camera
 from placerec.frames.images import all_images
 from placerec.frames.live import LatestFrameQueue, LiveFrame, Stopped, ended_by_interrupt, real_time
+from placerec.frames.sequence import gray_levels
 from placerec.hohmm import Belief, SequenceDecoder, format_header
 from placerec.methods.decode import format_belief
 from placerec.methods.decoders import HOHMM, make_decoder
@@ -150,7 +151,7 @@ def _believed(
     try:
         if isinstance(image, str):
             raise VisionError(image)
-        words, distances = dictionary.words_of(image)
+        words, distances = dictionary.words_of(gray_levels(image))
     except VisionError as error:
         tally.unusable(error)
         decoder.skip()

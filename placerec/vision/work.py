@@ -17,7 +17,7 @@ from placerec.errors import SourceError, VisionError
 from placerec.files import content_digest
 from placerec.frames import Frame, Sequence as FrameSequence, read_gray
 from placerec.frames.images import Batch, batches, content_key, with_images
-from placerec.frames.sequence import Gray
+from placerec.frames.sequence import Gray, Image, gray_levels
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress, RemoteExecutor, workers
 from placerec.journal import Cache, Journal
@@ -93,12 +93,12 @@ def describe_batch(spec: DescriptorSpec, batch: Batch) -> BatchResult:
     return BatchResult(np.array(kept, np.int64), np.asarray(blank), tuple(reasons), {"values": values})
 
 
-def describe_frame(frame: Frame, image: Gray | str | None, spec: DescriptorSpec) -> Singles | str:
+def describe_frame(frame: Frame, image: Image | str | None, spec: DescriptorSpec) -> Singles | str:
     """A frame's descriptor, or the reason why there is none; `image`: None if it is still in its file."""
     if isinstance(image, str):
         return image
     try:
-        return descriptor(read_gray(frame.path) if image is None else image, spec)
+        return descriptor(read_gray(frame.path) if image is None else gray_levels(image), spec)
     except SourceError as error:
         return str(error)
     except VisionError as error:
@@ -226,11 +226,12 @@ def _absolute(batch: Batch) -> Batch:
     return replace(batch, frames=tuple(replace(frame, path=frame.path.absolute()) for frame in batch.frames))
 
 
-def _shrunk(image: Gray | str, spec: DescriptorSpec) -> Gray | str:
+def _shrunk(image: Image | str, spec: DescriptorSpec) -> Gray | str:
     """The image as it is fitted for its descriptor, which is the first that is done to it anyway."""
     if isinstance(image, str):
         return image
+    gray = gray_levels(image)
     try:
-        return fit_image(check_gray(image), spec.image_size, spec.fit)
+        return fit_image(check_gray(gray), spec.image_size, spec.fit)
     except VisionError:
-        return image  # and what describes it says why
+        return gray  # and what describes it says why

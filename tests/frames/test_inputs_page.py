@@ -13,7 +13,8 @@ from helpers.recordings import grays, pictures, raw
 
 from placerec.errors import SourceError
 from placerec.frames import Sequence, SourceOptions, find_sequences, read_gray
-from placerec.frames.ros_image import RAW, gray_of
+from placerec.frames.ros_image import RAW, image_of
+from placerec.frames.sequence import gray_levels
 
 PAGE = (Path(__file__).parents[2] / "docs/inputs.md").read_text(encoding="utf-8")
 NUMBERED = [f"{i:06d}.png" for i in range(3)]
@@ -193,7 +194,7 @@ def test_encodings_of_raw_messages(encoding: str) -> None:
     }[encoding]
     fields: dict[str, Any] = planes if encoding in ("nv12", "nv21", "yuv420", "i420", "yv12") else {}
     message = SimpleNamespace(**raw(shown, encoding, **fields).fields)
-    assert np.allclose(gray_of(message, RAW, "it"), gray, atol=0.02)
+    assert np.allclose(gray_levels(image_of(message, RAW, "it")), gray, atol=0.02)
 
 
 @pytest.mark.parametrize(
@@ -203,7 +204,7 @@ def test_encodings_of_bayer(encoding: str) -> None:
     level = 100 if encoding.endswith("8") else 100 * 257
     even = np.full((16, 16), level, np.uint8 if encoding.endswith("8") else np.uint16)
     message = SimpleNamespace(**raw(even, encoding).fields)
-    bright = gray_of(message, RAW, "it")
+    bright = gray_levels(image_of(message, RAW, "it"))
     assert bright.shape == (16, 16)
     assert len(np.unique(bright)) == 1
 

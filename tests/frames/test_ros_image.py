@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 
 from placerec.errors import SourceError
 from placerec.frames.image import as_gray
-from placerec.frames.ros_image import RAW, gray_of
+from placerec.frames.ros_image import RAW, image_of
 
 COLOUR = pictures(1)[0]
 GRAY = cv2.cvtColor(COLOUR, cv2.COLOR_BGR2GRAY)
 
 
 def levels(picture: NDArray[Any], encoding: str, **fields: Any) -> NDArray[Any]:
-    return gray_of(SimpleNamespace(**raw(picture, encoding, **fields).fields), RAW, "it")
+    image = image_of(SimpleNamespace(**raw(picture, encoding, **fields).fields), RAW, "it")
+    assert isinstance(image, np.ndarray)
+    return image
 
 
 def failure(picture: NDArray[Any], encoding: str, **fields: Any) -> str:

@@ -1,7 +1,7 @@
 """Real recordings for tests: videos written by OpenCV, bags written by rosbags."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.frames import Sequence as FrameSequence, SourceOptions, find_sequences
-from placerec.frames.sequence import Gray
+from placerec.frames import Sequence as FrameSequence, SourceOptions, all_images, find_sequences
+from placerec.frames.sequence import ColourImage, Gray, Image, gray_levels
 
 Picture = NDArray[np.uint8]
 START = 1_700_000_000 * 10**9
@@ -54,7 +54,30 @@ def read_images(sequence: FrameSequence, first: int = 0) -> list[Gray | str]:
     assert sequence.recording is not None
     images = list(sequence.recording.frames(first))
     assert [frame for frame, _ in images] == list(sequence.frames[first:])
-    return [gray for _, gray in images]
+    return grays_of(image for _, image in images)
+
+
+def grays_of(images: Iterable[Image | str]) -> list[Gray | str]:
+    """Grey levels, or the reasons why there are none."""
+    return [image if isinstance(image, str) else gray_levels(image) for image in images]
+
+
+def read_in_colours(sequence: FrameSequence, first: int = 0) -> list[ColourImage]:
+    """All frames from one on in colours, with the grey levels that are read without them, byte for byte."""
+    with_colours = list(all_images(sequence, colours=True))[first:]
+    plain = list(all_images(sequence))[first:]
+    assert len(with_colours) == len(plain) == len(sequence.frames) - first
+    found = []
+    for (frame, image), (same, gray) in zip(with_colours, plain, strict=True):
+        assert frame == same
+        assert isinstance(image, ColourImage), image
+        assert isinstance(gray, np.ndarray)
+        assert image.gray.dtype == gray.dtype
+        assert np.array_equal(image.gray, gray)
+        assert image.colours.dtype == np.uint8
+        assert image.colours.shape == (*gray.shape, 3)
+        found.append(image)
+    return found
 
 
 def write_video(path: Path, codec: str = "mp4v", frames: Sequence[Picture] | None = None, rate: float = 10) -> Path:

@@ -51,7 +51,7 @@ class Recorded:
     over: threading.Event = field(default_factory=threading.Event)
     endless = False
 
-    def frames(self, first: int = 0) -> Iterator[tuple[Frame, Gray | str]]:
+    def frames(self, first: int = 0, *, colours: bool = False) -> Iterator[tuple[Frame, Gray | str]]:
         for shot in self.given[first:]:
             if self.turns is not None:
                 assert self.turns.acquire(timeout=60)

@@ -19,7 +19,7 @@ from placerec.errors import EvaluationError, SourceError, VisionError
 from placerec.experiments.comparison.several import SeveralDictionaries, microseconds_of_words
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.frames import Sequence as FrameSequence, images_at
-from placerec.frames.sequence import Gray
+from placerec.frames.sequence import Gray, gray_levels
 from placerec.frames.table import Labels
 from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder, learned_transition
 from placerec.hohmm.weights import shares_of
@@ -147,7 +147,7 @@ def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descripto
         for image in images_at(sequence, [k for own, k in chosen if own == number]):
             if isinstance(image, str):
                 raise SourceError(image)
-            yield image
+            yield gray_levels(image)
 
 
 @dataclass(frozen=True)
