@@ -19,7 +19,7 @@ from placerec.hohmm import Beliefs, write_beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import WordTable, typical_images, word_sentences, word_table
 from placerec.jobs import ProgressBar
-from placerec.lab.layout import render_lab
+from placerec.lab.layout import render_lab, warn_of_another
 from placerec.lm.inspect import format_inspection, inspect_model
 from placerec.model import ModelOptions, load_recognizer, read_corpus, train_model
 from placerec.model.folder import ModelFolder
@@ -61,6 +61,7 @@ def run_demo(
     and one for LEARNED. Raises MissingExtraError without matplotlib, before any work.
     """
     check_optional("matplotlib", "a picture")
+    warn_of_another(Path(out) / "lab", scale, seed)
     with whole_folder(Path(out), OWNED) as folder:
         log.info("Rendering the synthetic laboratory (%s, seed %d)", scale, seed)
         with progress("render") as show:

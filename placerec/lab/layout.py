@@ -1,6 +1,9 @@
 """Writes the laboratory as COLD lays out its sequences (Saarbruecken's style of names)."""
 
+import logging
+import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +20,8 @@ from placerec.lab.path import Timing, Track, drive
 from placerec.lab.scene import Paint, light_up, paint, panels_of_run
 from placerec.lab.world import Panel, outline, place
 
-OWNED = ("seq[34]_*", "README.txt")
+README = "README.txt"
+OWNED = ("seq[34]_*", README)
 SEQUENCES = tuple(
     f"{path}_{weather}{run}" for path in ("seq3", "seq4") for weather in ILLUMINATIONS for run in (1, 2, 3)
 )
@@ -25,6 +29,8 @@ JPEG_QUALITY = 90
 # 7 July 2006, 17:13 UTC: when COLD was recorded in Saarbruecken.
 FIRST_DAY = 1152292394.730711
 MIDDLE_GREY = 0.22
+_FIRST_LINE = "Synthetic image sequences, made by `placerec lab {}`."
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -48,14 +54,29 @@ SCALES = {
 def render_lab(out: Path | str, *, scale: str = "small", seed: int = 0, progress: Progress | None = None) -> int:
     """Write the laboratory's 18 sequences to the folder `out` and return the number of frames.
 
-    The same scale and seed give the same bytes. `progress` is called with (frames written, frames in all). Raises
+    The same scale and seed give the same bytes; a laboratory of others that they take the place of is named in a
+    warning. `progress` is called with (frames written, frames in all). Raises
     OutputError for an unknown scale, a negative seed, or a folder that cannot be written or holds other things.
     """
     if scale not in SCALES:
         raise OutputError(f"scale {scale!r} is unknown; use one of {', '.join(SCALES)}")
     if seed < 0:
         raise OutputError(f"seed {seed} is negative; use 0 or more")
-    return render(Path(out), SCALES[scale], f"--scale {scale} --seed {seed}", seed, SEQUENCES, progress)
+    warn_of_another(Path(out), scale, seed)
+    return render(Path(out), SCALES[scale], _options(scale, seed), seed, SEQUENCES, progress)
+
+
+def warn_of_another(folder: Path, scale: str, seed: int) -> None:
+    """Warn that a laboratory of this scale and seed will take the place of another one that is in the folder."""
+    with suppress(OSError, UnicodeDecodeError):
+        first = (folder / README).read_text(encoding="utf-8").partition("\n")[0]
+        found = re.fullmatch(re.escape(_FIRST_LINE).replace(r"\{\}", "(--scale .*)"), first)
+        if found and found[1] != _options(scale, seed):
+            log.warning("%s: was the laboratory of %s, and becomes that of %s", folder, found[1], _options(scale, seed))
+
+
+def _options(scale: str, seed: int) -> str:
+    return f"--scale {scale} --seed {seed}"
 
 
 def render(
@@ -73,7 +94,7 @@ def render(
                 done += 1
                 if progress is not None:
                     progress(done, total)
-        (folder / "README.txt").write_text(_readme(made_by, len(runs), total), encoding="utf-8", newline="\n")
+        (folder / README).write_text(_readme(made_by, len(runs), total), encoding="utf-8", newline="\n")
     return total
 
 
@@ -130,7 +151,7 @@ def _jpeg(picture: NDArray[np.uint8]) -> bytes:
 
 
 def _readme(made_by: str, sequences: int, frames: int) -> str:
-    return f"""Synthetic image sequences, made by `placerec lab {made_by}`.
+    return f"""{_FIRST_LINE.format(made_by)}
 
 No camera saw these rooms: a small laboratory was drawn and a robot's drive through it was rendered. The folders, file
 names and labels are laid out as in the COLD database (Saarbruecken, part B); no picture and no number is COLD's.

@@ -1,6 +1,7 @@
 """The laboratory's files: COLD's layout and names, the same bytes from the same seed, labels that fit the poses."""
 
 import re
+from contextlib import nullcontext
 from pathlib import Path
 
 import cv2
@@ -8,8 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from placerec import demo
 from placerec.errors import OutputError
-from placerec.lab.layout import SCALES, SEQUENCES, Scale, render, render_lab
+from placerec.lab import layout
+from placerec.lab.layout import SCALES, SEQUENCES, Scale, render, render_lab, warn_of_another
 from placerec.lab.path import Timing
 from placerec.lab.world import place
 
@@ -135,6 +138,39 @@ def test_unknown_scale_and_negative_seed_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="seed -1 is negative"):
         render_lab(tmp_path / "x", seed=-1)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_who_replaces_another_laboratory_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Rendered whole it would take a minute: what is there tells what made it."""
+    folder = tmp_path / "lab"
+    render(folder, SMALLEST, "--scale tiny --seed 3", 3, ("seq3_cloudy1",))
+    warn_of_another(folder, "tiny", 3)
+    warn_of_another(tmp_path / "none", "tiny", 4)
+    assert caplog.messages == []
+    warn_of_another(folder, "tiny", 4)
+    told = f"{folder}: was the laboratory of --scale tiny --seed 3, and becomes that of --scale tiny --seed 4"
+    assert caplog.messages == [told]
+    (folder / "README.txt").write_bytes(b"\xff mine")
+    warn_of_another(folder, "tiny", 4)
+    assert caplog.messages == [told]
+
+
+def test_the_warning_comes_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    render(tmp_path / "demo/lab", SMALLEST, "--scale small --seed 3", 3, ("seq3_cloudy1",))
+
+    def stop(*args: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(layout, "render", stop)
+    told = "was the laboratory of --scale small --seed 3, and becomes that of --scale small --seed 0"
+    with pytest.raises(KeyboardInterrupt):
+        render_lab(tmp_path / "demo/lab")
+    monkeypatch.setattr(demo, "render_lab", stop)
+    with pytest.raises(KeyboardInterrupt):
+        demo.run_demo(tmp_path / "demo", progress=lambda label: nullcontext(lambda done, total: None))
+    assert caplog.messages[:2] == [f"{tmp_path / 'demo/lab'}: {told}"] * 2
 
 
 def test_foreign_folder_is_left_alone(tmp_path: Path) -> None:
