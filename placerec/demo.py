@@ -1,7 +1,8 @@
 """The demonstration: the synthetic laboratory from images to a page to look at."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -12,18 +13,22 @@ from placerec.errors import check_optional
 from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.figures.canvas import figure_file, place_title
 from placerec.figures.evaluation import plot_evaluation
-from placerec.figures.pages import heading, html_page, paragraph, picture, preformatted, table
+from placerec.figures.pages import heading, paragraph, picture, preformatted, table
 from placerec.files import whole_folder, write_text
 from placerec.frames import Sequence as FrameSequence, find_sequences, read_gray
 from placerec.hohmm import Beliefs, write_beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import WordTable, typical_images, word_sentences, word_table
-from placerec.jobs import ProgressBar
+from placerec.jobs import Progress, ProgressBar
 from placerec.lab.layout import render_lab, warn_of_another
 from placerec.lm.inspect import format_inspection, inspect_model
-from placerec.model import ModelOptions, load_recognizer, read_corpus, train_model
+from placerec.model import Decoding, ModelOptions, load_recognizer, read_corpus, train_model
 from placerec.model.folder import ModelFolder
 from placerec.model.learn import learn_folder
+from placerec.page.drives import Drive, drives_of
+from placerec.page.pictures import pictures_of
+from placerec.page.report import Shown, report_page
+from placerec.page.tiles import typical_frames
 from placerec.vision import (
     Descriptors,
     Dictionary,
@@ -83,10 +88,37 @@ def run_demo(
         words = word_table(descriptors.take(~training), dictionary)
         draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title="The words of run 3")
         plot_evaluation(beliefs[best], results[best], folder / "beliefs.png")
-        write_text(
-            folder / "report.html", _report(folder, results, words, len(descriptors.frames), _commands(scale, seed))
-        )
+        log.info("Writing the page")
+        drives = _drives(folder, beliefs, best)
+        with progress("pictures") as show:
+            shown = _shown(folder, drives, sequences, descriptors.take(~training), show)
+        page = _report(folder, results, words, len(descriptors.frames), _commands(scale, seed), drives, shown)
+        write_text(folder / "report.html", page)
     return results
+
+
+def _drives(folder: Path, beliefs: Mapping[tuple[str, int], Sequence[Beliefs]], best: tuple[str, int]) -> list[Drive]:
+    """The test runs as all systems saw them, the best one first, with what decided every frame in that one."""
+    model = folder / "model" if best == LEARNED else folder / "models" / f"{best[0]}-{best[1]}"
+    recognizer = load_recognizer(model, options=Decoding(explain=True))
+    order = sorted(beliefs, key=lambda way: way != best)
+    drives = drives_of({_short_title(way): beliefs[way] for way in order})
+    reasons = ([*recognizer.explain_stream(one.stream)] for one in beliefs[best])
+    return [replace(drive, decisions={_short_title(best): found}) for drive, found in zip(drives, reasons, strict=True)]
+
+
+def _shown(
+    folder: Path,
+    drives: Sequence[Drive],
+    sequences: Iterable[FrameSequence],
+    descriptors: Descriptors,
+    progress: Progress,
+) -> Shown:
+    """Pictures of all frames, and the typical one of each word."""
+    learned = ModelFolder(folder / "model").words
+    dictionaries = DictionarySet.load(learned if learned.exists() else folder / "words.npz")
+    tests = {sequence.name: sequence for sequence in sequences if sequence.name.endswith(TEST_RUN)}
+    return Shown(pictures_of(drives, tests, {}, progress), typical_frames(drives, descriptors, dictionaries))
 
 
 def _recognise(folder: Path, smoothing: str, order: int) -> list[Beliefs]:
@@ -143,6 +175,10 @@ def _title(way: tuple[str, int]) -> str:
     return f"as in the paper: {way[0]}"
 
 
+def _short_title(way: tuple[str, int]) -> str:
+    return "placerec learn" if way == LEARNED else f"{way[0]}, n = {way[1]}"
+
+
 def _note(order: int) -> str:
     return " (the classical HMM)" if order == 1 else ""
 
@@ -177,14 +213,27 @@ def _contact_sheet(images: Mapping[str, Mapping[str, Path]], path: Path) -> None
             axes.set_title(place_title(column), fontsize=9)
 
 
-def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, commands: str) -> str:
-    body = [
-        paragraph(
-            f"A camera was driven through a small office laboratory: {frames} frames in 18 sequences. The laboratory "
-            "is synthetic, rendered by placerec itself; its results say that the program works, not how well it does "
-            f"in your rooms. {_method(results)} A Bayesian filter followed the belief over places through the six "
-            "sequences that trained nothing."
-        ),
+def _report(
+    folder: Path,
+    results: DemoResults,
+    words: WordTable,
+    frames: int,
+    commands: str,
+    drives: Sequence[Drive],
+    shown: Shown,
+) -> str:
+    said = (
+        f"A camera was driven through a small office laboratory: {frames} frames in 18 sequences. {_method(results)} A "
+        "Bayesian filter followed the belief over places through the six sequences that trained nothing."
+    )
+    warning = (
+        "The laboratory is synthetic, rendered by placerec itself: its results say that the program works, not how "
+        "well it does in your rooms. Point at a moment:"
+    )
+    more = [
+        heading("Frames recognised"),
+        paragraph(said),
+        _results_table(results),
         heading("The synthetic laboratory"),
         picture(
             folder / "laboratory.png",
@@ -198,14 +247,6 @@ def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, c
             "For each of the 100 words a typical frame, framed in the colour of its place",
             "What the words look like in the six synthetic test sequences, as “placerec show-words” draws it.",
         ),
-        heading("Frames recognised"),
-        _results_table(results),
-        heading("Belief over time"),
-        picture(
-            folder / "beliefs.png",
-            "Belief over places for each test sequence, and the confusion matrix",
-            f"{_title(next(iter(results)))}, n = 2, on the six synthetic test sequences.",
-        ),
         heading("Everything between is text"),
         paragraph("A token stream, one word per frame (tokens/seq4_cloudy3.tsv):"),
         preformatted(_head(folder / "tokens/seq4_cloudy3.tsv", 8)),
@@ -216,7 +257,8 @@ def _report(folder: Path, results: DemoResults, words: WordTable, frames: int, c
         heading("Do it again"),
         preformatted(commands),
     ]
-    return html_page("placerec: which place is the camera in?", body)
+    title = "placerec: which place is the camera in? A synthetic laboratory"
+    return report_page(title, drives, shown, intro=[paragraph(warning)], more=more)
 
 
 def _method(results: DemoResults) -> str:

@@ -2,14 +2,14 @@
 
 import base64
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from placerec.errors import SourceError
 from placerec.frames import Sequence as FrameSequence
 from placerec.frames.images import picture_at
-from placerec.frames.sequence import Gray
-from placerec.jobs import Progress
+from placerec.jobs import Executor, Progress, workers
 from placerec.page.drives import Drive
 
 # The most pixels of height, and WebP's quality: 1 to 5 kB a frame.
@@ -63,15 +63,17 @@ def pictures_of(
         kept = chosen_frames(len(drive.frames), wanted.get(drive.name, ()), most)
         sequence = sequences[drive.name]
         number = {frame.name: index for index, frame in enumerate(sequence.frames)}
-        at: dict[int, str] = {}
-        for frame in kept:
-            image = picture_at(sequence, number[drive.frames[frame]], _HEIGHT)
-            if not isinstance(image, str):
-                at[frame] = picture_text(image)
+        indices = [number[drive.frames[frame]] for frame in kept]
+        # A recording is one file, which is read by one.
+        work: Executor = workers() if sequence.recording is None else map
+        found: dict[int, str] = {}
+        for frame, text in zip(kept, work(partial(_picture_text, sequence), indices), strict=True):
+            if text:
+                found[frame] = text
             done += 1
             if progress:
                 progress(done, min(total, MOST))
-        made[drive.name] = ([*at], [*at.values()])
+        made[drive.name] = ([*found], [*found.values()])
     return made
 
 
@@ -92,10 +94,13 @@ def _thinned(numbers: list[int], most: int) -> list[int]:
     return [numbers[k] for k in np.linspace(0, len(numbers) - 1, max(most, 0)).round().astype(int).tolist()]
 
 
-def picture_text(image: Gray) -> str:
-    """A picture (h, w) or (h, w, 3) of 0..255 as what stands in a page in place of a picture's address."""
+def _picture_text(sequence: FrameSequence, index: int) -> str:
+    """What stands in a page in place of the address of a frame's picture; "" for a frame that cannot be read."""
     import cv2
 
+    image = picture_at(sequence, index, _HEIGHT)
+    if isinstance(image, str):
+        return ""
     done, data = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
     if not done:
         raise SourceError("OpenCV cannot write WebP here; install the wheel opencv-python-headless")

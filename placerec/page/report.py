@@ -77,7 +77,7 @@ def report(
             if drive.name not in sequences:
                 log.warning("%s: no source has its frames; it is shown without pictures", drive.name)
     title = drives[0].name if len(drives) == 1 else f"{len(drives)} drives"
-    write_text(Path(out), report_page(f"placerec report: {title}", drives, shown))
+    write_text(Path(out), report_page(f"placerec report: {title}", drives, shown, more=systems_table(drives)))
     return drives
 
 
@@ -89,8 +89,7 @@ def report_page(
     `intro` and `more` are pieces of HTML from `placerec.figures.pages`.
     """
     judged = judge(drives)
-    start = [*headline(drives, judged), *intro, explorer(drives, shown), *_still(drives, judged)]
-    body = [*start, *systems_table(judged), *more]
+    body = [*headline(drives, judged), *intro, explorer(drives, shown), *_still(drives, judged), *more]
     style = assets.text("page.css") + assets.text("report.css")
     return html_page(title, body, style=style, script=assets.in_one("report.js"))
 
@@ -124,11 +123,11 @@ def headline(drives: Sequence[Drive], judged: Mapping[str, Evaluation]) -> list[
     return [f'<p class="headline">{told}</p>', f'<p class="soft">{below}.</p>']
 
 
-def systems_table(judged: Mapping[str, Evaluation]) -> list[str]:
+def systems_table(drives: Sequence[Drive]) -> list[str]:
     """A line per system, if there are several."""
     rows = [
         (name, percent(one.accuracy), percent(one.balanced_accuracy), f"{one.ece:.3f}", f"{one.log_loss:.2f}")
-        for name, one in judged.items()
+        for name, one in judge(drives).items()
     ]
     head = ("beliefs", "frames right", "mean recall of places", "ECE", "log loss")
     return [table(head, rows, "All beliefs of this page.")] if len(rows) > 1 else []

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.decoded_images import write_decoded_images
 from helpers.small_world import PLACES, beliefs_of, write_images, write_world
 from helpers.typed_commands import done, misused
 
@@ -23,16 +24,7 @@ NASTY = "<script>alert(1)</script>"
 
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Images, words, a model and beliefs with explanations, of two runs."""
-    root = tmp_path_factory.mktemp("world")
-    for seed, name in enumerate(("run1", "run2")):
-        write_images(root / "runs" / name, seed)
-    done("train-words", root / "runs", "-o", root / "words.npz", "--size", 2, "--components", 4, "-q")
-    done("tokenize", root / "runs", "-w", root / "words.npz", "-o", root / "tokens", "-q")
-    done("train-lm", root / "tokens", "-o", root / "model", "-q")
-    done("decode", root / "tokens", "-m", root / "model", "-o", root / "beliefs", "--explain", "-q")
-    done("decode", root / "tokens", "-m", root / "model", "-o", root / "others", "--method", "naive-bayes", "-q")
-    return root
+    return write_decoded_images(tmp_path_factory.mktemp("world"))
 
 
 def data_in(page: Path | str) -> dict[str, Any]:

@@ -104,7 +104,8 @@ export function momentsOf(data, kind, a, b, place) {
 function runStarts(drive, a, b, frames) {
   return frames.filter((frame, at) => {
     const goesOn = at > 0 && frames[at - 1] === frame - 1;
-    return !goesOn || [a, b].some((s) => drive.systems[s] && drive.systems[s].best[frame] !== drive.systems[s].best[frame - 1]);
+    const systems = [a, b].map((number) => drive.systems[number]).filter(Boolean);
+    return !goesOn || systems.some(({ best }) => best[frame] !== best[frame - 1]);
   });
 }
 

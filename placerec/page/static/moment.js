@@ -61,7 +61,8 @@ function verdict(data, drive, frame, number, systems) {
   const mark = make("strong", meaning === "wrong" ? "warn" : "", sign);
   mark.title = meaning;
   const held = system.selected[frame] ? null : make("span", "soft", " (a frame that was not taken in)");
-  return make("div", "", make("span", "soft", name), placeName(data, system.best[frame]), mark, held);
+  const which = make("span", systems.length > 1 ? `system-${systems.indexOf(number)}` : "soft", name);
+  return make("div", "", which, placeName(data, system.best[frame]), mark, held);
 }
 
 // The places' probabilities, of each system a bar.
@@ -70,7 +71,9 @@ function bars(data, drive, frame, systems) {
   const size = data.places.length;
   const of = (number, place) => drive.systems[number].belief[frame * size + place];
   data.places.forEach((_, place) => {
-    const row = make("div", "belief", make("span", "place", swatch(data.places, place), data.titles[place]));
+    // Two bars leave room for the name alone.
+    const name = systems.length > 1 ? data.places[place] : data.titles[place];
+    const row = make("div", "belief", make("span", "place", swatch(data.places, place), name));
     if (place === drive.truth[frame]) row.classList.add("true");
     for (const number of systems) {
       const share = of(number, place);

@@ -26,10 +26,18 @@ function start() {
   makeControls();
   makeLegend();
   makeStrips();
-  readAddress();
+  const asked = readAddress();
+  if (!asked) goToFirstError();
   showAll();
+  if (asked) strips[state.drive].host.parentElement.scrollIntoView({ block: "nearest" });
   document.addEventListener("keydown", onKey);
   addEventListener("hashchange", () => readAddress() && showAll());
+}
+
+// Where something went wrong there is most to see.
+function goToFirstError() {
+  const [first] = momentsOf(data, "errors", state.a, -1, -1);
+  if (first) [state.drive, state.frame] = first;
 }
 
 function chooser(title, options, value, changed) {
@@ -40,7 +48,14 @@ function chooser(title, options, value, changed) {
     select.append(option);
   }
   select.value = value;
-  select.addEventListener("change", () => changed(select.value));
+  let pointed = false;
+  select.addEventListener("pointerdown", () => (pointed = true));
+  select.addEventListener("keydown", () => (pointed = false));
+  select.addEventListener("change", () => {
+    // Who chose with the mouse goes on with keys, which a list that keeps the focus would take.
+    if (pointed) select.blur();
+    changed(select.value);
+  });
   return [make("label", "", make("span", "soft", `${title} `), select), select];
 }
 
@@ -120,8 +135,9 @@ function change(changes) {
   Object.assign(state, changes);
   if (KINDS[state.kind].second && state.b < 0) state.b = data.systems.findIndex((_, one) => one !== state.a);
   showAll();
-  // The first moment of what was asked for, if the present one is none.
-  if (shown.moments.length && !shown.moments.some((one) => isHere(one))) step(1);
+  // To a moment of what was asked for, if the present one is none; of the least sure ones always to the first.
+  if (changes.kind === "unsure" && shown.moments.length) go(...shown.moments[0]);
+  else if (!shown.moments.some((one) => isHere(one))) step(1);
 }
 
 function isHere([number, frame]) {
@@ -176,9 +192,9 @@ function rowsOf(drive) {
     }
   }
   if (state.kind !== "all" || state.place >= 0) {
-    const frames = state.kind === "unsure" ? shown.moments.filter(([number]) => data.drives[number] === drive).map(([, frame]) => frame)
-      : meantFrames(drive, state.kind, state.a, state.b, state.place);
-    rows.push({ name: nameOfChoice(), height: MARKS, marks: frames });
+    const own = shown.moments.filter(([number]) => data.drives[number] === drive).map(([, frame]) => frame);
+    const marks = state.kind === "unsure" ? own : meantFrames(drive, state.kind, state.a, state.b, state.place);
+    rows.push({ name: nameOfChoice(), height: MARKS, marks });
   }
   return rows;
 }
@@ -219,7 +235,8 @@ function goDrive(by) {
 }
 
 function onKey(event) {
-  if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || /^(SELECT|INPUT|TEXTAREA)$/.test(event.target.tagName)) return;
+  const held = event.ctrlKey || event.metaKey || event.altKey;
+  if (event.defaultPrevented || held || event.target.tagName === "SELECT") return;
   const kind = Object.keys(KINDS).find((name) => KINDS[name].key === event.key);
   const actions = {
     n: () => step(1),
