@@ -12,6 +12,7 @@ import pytest
 from helpers.browser import chromium, complaints, picture_of, press, press_with, set_size
 from helpers.decoded_images import write_decoded_images
 from helpers.small_world import beliefs_of
+from helpers.waiting import wait_until
 
 from placerec.page.drives import Drive
 from placerec.page.report import report, report_page
@@ -214,8 +215,12 @@ def test_frames_words_and_reasons_of_a_real_model_are_shown(browser: Any, tmp_pa
     # The film is there: something else than one colour.
     browser.execute_script("scrollTo(0, 0)")
     top = browser.find_element("css selector", ".strip").rect
-    picture = cv2.imread(str(picture_of(browser, tmp_path / "shot.png")))
-    assert picture is not None
-    film = picture[round(top["y"]) + 5 : round(top["y"]) + 55, round(top["x"]) + 5 : round(top["x"]) + 60]
-    assert len(np.unique(film.reshape(-1, 3), axis=0)) > 20
+    x, y = round(top["x"]), round(top["y"])
+
+    def film_is_there() -> bool:
+        picture = cv2.imread(str(picture_of(browser, tmp_path / "shot.png")))
+        assert picture is not None
+        return len(np.unique(picture[y + 5 : y + 55, x + 5 : x + 60].reshape(-1, 3), axis=0)) > 20
+
+    wait_until(film_is_there, "no picture comes into the film")
     assert complaints(browser) == []
