@@ -16,7 +16,7 @@ import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import EvaluationError, SourceError, VisionError
-from placerec.experiments.comparison.several import SeveralDictionaries, microseconds_of_words
+from placerec.experiments.several import SeveralDictionaries, microseconds_of_words
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.frames import Sequence as FrameSequence, images_at
 from placerec.frames.sequence import Gray, gray_levels

@@ -27,7 +27,7 @@ from placerec.experiments.comparison.benchmark import (
 )
 from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
-from placerec.experiments.comparison.several import learn_several
+from placerec.experiments.several import learn_several
 from placerec.experiments.store import Described, WordsJob, describe_all, held_output, keep_given, key_of, load
 from placerec.figures.canvas import check_figure
 from placerec.files import whole_folder, write_text
