@@ -30,6 +30,8 @@ from placerec.lab.layout import render_lab
 PAGE = Path(__file__).parents[1] / "experiment.md"
 FOLDER = PAGE.with_suffix("")
 KEPT = ("results.csv", "sequences.csv", "figure.svg", "figure-learned.svg")
+# What `placerec learn` makes of images; of token streams there is none.
+LEARNED = "learned.csv"
 SYNTHETIC = "synthetic"
 SHARES = ("accuracy", "balanced_accuracy", "majority_accuracy", "same_word_run", "log_loss", "ece")
 TRANSITIONS = ("fixed", "learned")
@@ -49,7 +51,7 @@ def run(name: str, data: Path, work: Path, jobs: int) -> None:
     config = shutil.copy(FOLDER / f"{name}.toml", work)
     experiment(config, work / name, jobs=jobs)
     (FOLDER / name).mkdir(exist_ok=True)
-    for kept in KEPT:
+    for kept in (*KEPT, *([LEARNED] if (work / name / LEARNED).exists() else [])):
         shutil.copy(work / name / kept, FOLDER / name)
 
 
@@ -94,7 +96,7 @@ def tables(found: Mapping[str, Sequence[Row]]) -> dict[str, str]:
     made = {}
     claims = {name: [judge(Results(rows, {}), of) for of in TRANSITIONS] for name, rows in found.items()}
     for name, rows in found.items():
-        made[f"{name} data"] = data_line(rows)
+        made[f"{name} data"] = data_line(rows) + learned_line(FOLDER / name / LEARNED)
         made[f"{name} baselines"] = markdown(baselines_table(rows))
         made[f"{name} selection"] = markdown(selection_table(rows))
         made[f"{name} order"] = markdown(order_table(rows))
@@ -120,6 +122,23 @@ def data_line(rows: Sequence[Row]) -> str:
         f"{sum(frames.values())} test frames of {len(frames)} sequences, {folds} fold{'s' * (folds != 1)}, "
         f"{seeds} maps of each size; {len(rows)} rows in results.csv. Mean over all cells: {fixed:.1f} % right with "
         f"fixed transitions, {learned:.1f} % with learned ones.\n"
+    )
+
+
+def learned_line(path: Path) -> str:
+    """How much of the same frames `placerec learn` has right, mean and deviation over seeds; "" without the file."""
+    if not path.exists():
+        return ""
+    of_seed: dict[str, list[dict[str, str]]] = {}
+    for line in _lines(path):
+        of_seed.setdefault(line["seed"], []).append(line)
+    frames = np.array([[int(line["frames"]) for line in lines] for lines in of_seed.values()])
+    right = np.array([[int(line["right"]) for line in lines] for lines in of_seed.values()])
+    loss = np.array([[float(line["log_loss"]) for line in lines] for lines in of_seed.values()])
+    percent, nats = 100 * right.sum(axis=1) / frames.sum(axis=1), (frames * loss).sum(axis=1) / frames.sum(axis=1)
+    return (
+        f"\nThe system of `placerec learn` on the same folds, {len(percent)} seeds: {_text(percent)} % right, log loss "
+        f"{nats.mean():.2f}.\n"
     )
 
 

@@ -70,7 +70,8 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
     """Run the paper's grid of experiments, or another.
 
     Every combination of order, smoothing, selection, map size and transitions that CONFIG.toml lists, for every seed
-    and fold: results.csv, the paper's figure, its tables, its claims, and a page that shows all of it.
+    and fold: results.csv, the paper's figure, its tables, its claims, and a page that shows all of it. Beside the grid
+    stands what `placerec learn` makes of the same images.
 
     \b
     [data]
@@ -83,6 +84,8 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
     size = [10, 20]
     transition = ["fixed", "learned"]
     seeds = 5
+    [options]
+    as_in_paper = true  # the grid alone
     """
     from placerec.experiments.grid.run import experiment as run
     from placerec.jobs import processors

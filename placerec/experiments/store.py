@@ -196,13 +196,17 @@ class WordsJob:
         return self.cache / "words" / f"{key}.npz"
 
     @property
-    def folder(self) -> Path:
-        """The token streams' folder."""
-        labels = [
+    def labels(self) -> list[object]:
+        """All that is known of the frames but for the words, as a part of a key."""
+        return [
             (one.sequence.name, one.kept.stem, [(f.name, repr(f.time), f.place) for f in one.sequence.frames])
             for one in (*self.train, *self.test)
         ]
-        return self.cache / "tokens" / key_of("tokens", self.words.stem, labels)
+
+    @property
+    def folder(self) -> Path:
+        """The token streams' folder."""
+        return self.cache / "tokens" / key_of("tokens", self.words.stem, self.labels)
 
     @property
     def made(self) -> bool:

@@ -127,6 +127,14 @@ def test_a_table_is_that_of_plain_sums(program: ModuleType, folder: Path) -> Non
             assert number == f"{np.mean(seeds):.1f} ± {np.std(seeds, ddof=1):.1f}"
 
 
+def test_what_learn_makes_is_the_mean_over_seeds_of_all_folds(program: ModuleType, tmp_path: Path) -> None:
+    assert program.learned_line(tmp_path / "learned.csv") == ""
+    rows = ["seed,fold,frames,right,log_loss", "0,a,30,30,0.1", "0,b,10,2,0.5", "1,a,30,27,0.2", "1,b,10,1,0.6"]
+    (tmp_path / "learned.csv").write_text("".join(f"{row}\n" for row in rows), encoding="utf-8")
+    told = "The system of `placerec learn` on the same folds, 2 seeds: 75.0 ± 7.1 % right, log loss 0.25."
+    assert program.learned_line(tmp_path / "learned.csv") == f"\n{told}\n"
+
+
 def test_a_run_is_kept_and_read_as_it_was(program: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for seed in "01":
         write_tokens(tmp_path / "sets" / "tiny" / seed)

@@ -16,13 +16,14 @@ def write(tmp_path: Path, text: str) -> Path:
 
 
 def test_all_of_a_config_is_read(tmp_path: Path) -> None:
-    text = CONFIG.replace("[grid]", '[options]\nstay = 0.9\nper = "frame"\nunits = "all"\n[grid]')
+    options = '[options]\nstay = 0.9\nper = "frame"\nunits = "all"\nas_in_paper = true\n'
+    text = CONFIG.replace("[grid]", f"{options}[grid]")
     config = read_config(write(tmp_path, text))
     assert (config.order, config.size, config.seeds) == ((1, 3), (4,), 1)
     assert config.smoothing == ("witten-bell", "lidstone-backoff")
     assert config.select == ("none", "compress:3", "unique")
     assert config.transition == ("fixed", "learned")
-    assert (config.stay, config.per, config.units) == (0.9, "frame", "all")
+    assert (config.stay, config.per, config.units, config.as_in_paper) == (0.9, "frame", "all", True)
     assert (config.sequences, config.test, config.split) == ((), ("run3",), "")
 
 
@@ -30,7 +31,7 @@ def test_defaults_are_the_papers(tmp_path: Path) -> None:
     text = '[data]\nsequences = ["a"]\nsplit = "leave-one-out"\n[grid]\norder = [1]\nsmoothing = ["witten-bell"]\n'
     config = read_config(write(tmp_path, text + 'select = ["none"]\nsize = [10]\n'))
     assert (config.transition, config.seeds) == (("fixed",), 5)
-    assert (config.stay, config.per, config.units) == (0.99, "update", "live")
+    assert (config.stay, config.per, config.units, config.as_in_paper) == (0.99, "update", "live", False)
 
 
 def test_tokens_are_found_by_size_and_seed(tmp_path: Path) -> None:
@@ -68,6 +69,11 @@ def test_tokens_are_found_by_size_and_seed(tmp_path: Path) -> None:
         ("[grid]", "[options]\nstay = 1.5\n[grid]", "[options] stay = 1.5 cannot be used; give a probability"),
         ("[grid]", '[options]\nper = "day"\n[grid]', "[options] per = 'day' cannot be used; choose update, frame"),
         ("[grid]", '[options]\nunits = "dead"\n[grid]', "[options] units = 'dead' cannot be used; choose live, all"),
+        (
+            "[grid]",
+            "[options]\nas_in_paper = 1\n[grid]",
+            "[options] as_in_paper = 1 cannot be used; write true or false",
+        ),
         ("[grid]", "[grid", "is not TOML: "),
         ("[data]", "options = 3\n[data]", "options = 3 is no table; write [options] on a line of its own"),
     ],

@@ -1,7 +1,10 @@
 """What an experiment writes beside its rows: figure, tables, claims, and a page that needs nothing else."""
 
+import csv
+import json
 import re
 import shlex
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -50,7 +53,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_everything_is_there(world: Path) -> None:
     names = {path.name for path in (world / "out").iterdir()}
     figures = {f"figure{of}{suffix}" for of in ("", "-learned") for suffix in (".png", ".svg")}
-    assert names == {"cache", "results.csv", "sequences.csv", "tables.md", "claims.md", "report.html", *figures}
+    files = {"results.csv", "sequences.csv", "learned.csv", "tables.md", "claims.md", "report.html"}
+    assert names == {"cache", *files, *figures}
 
 
 def test_the_page_needs_no_network_and_no_second_file(world: Path) -> None:
@@ -83,7 +87,8 @@ def test_the_commands_of_the_page_give_the_best_row(world: Path, monkeypatch: py
         for line in re.findall(r"^(?:<pre>)?placerec ([a-z-]+ .*?)(?:</pre>)?$", page, re.MULTILINE)
         if "experiment" not in line
     ]
-    assert [line.split()[0] for line in lines] == ["train-words", "tokenize", "train-lm", "decode", "evaluate"]
+    *steps, learn = [line.split()[0] for line in lines]
+    assert (steps, learn) == (["train-words", "tokenize", "train-lm", "decode", "evaluate"], "learn")
     monkeypatch.chdir(world)
     for line in lines:
         done(*shlex.split(line), "-q")
@@ -93,6 +98,36 @@ def test_the_commands_of_the_page_give_the_best_row(world: Path, monkeypatch: py
         r for r in results.rows if (r.select, r.order, r.transition) == (best.select, best.order, best.transition)
     ]
     assert evaluate_files([world / "beliefs"]).accuracy == row.accuracy
+    (learned,) = results.learned
+    found = evaluate_files([world / "learned/beliefs"])
+    assert (found.frames, found.accuracy, found.log_loss, found.ece) == pytest.approx(
+        (learned.frames, learned.accuracy, learned.log_loss, learned.ece), abs=1e-6
+    )
+    evidence = json.loads((world / "learned/model.json").read_text())["evidence"]
+    assert (evidence["alpha"], evidence["memory"]) == (learned.alpha, learned.memory)
+
+
+def test_what_learn_makes_is_beside_the_grid(world: Path) -> None:
+    with (world / "out/learned.csv").open(encoding="utf-8", newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert (row["seed"], row["fold"], row["frames"]) == ("0", "test", "12")
+    accuracy = f"{100 * int(row['right']) / 12:.1f}"
+    line = f"| several | placerec learn | none | 2 | learned | {accuracy} |  |  |"
+    assert line in (world / "out/tables.md").read_text(encoding="utf-8")
+    assert "placerec learn (several dictionaries" in (world / "out/figure.svg").read_text(encoding="utf-8")
+
+
+def test_as_in_the_paper_the_grid_is_alone(world: Path, tmp_path: Path) -> None:
+    shutil.copytree(world / "out", tmp_path / "out")
+    config = world / "paper.toml"
+    config.write_text(IMAGES + "as_in_paper = true\n", encoding="utf-8")
+    results = experiment(config, tmp_path / "out")
+    assert results.learned == []
+    assert not (tmp_path / "out/learned.csv").exists()
+    for name in ("results.csv", "sequences.csv"):
+        assert (tmp_path / "out" / name).read_bytes() == (world / "out" / name).read_bytes()
+    for name in ("tables.md", "report.html", "figure.svg"):
+        assert "placerec learn (" not in (tmp_path / "out" / name).read_text(encoding="utf-8")
 
 
 def test_what_is_there_is_not_made_again(world: Path, monkeypatch: pytest.MonkeyPatch) -> None:

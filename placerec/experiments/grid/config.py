@@ -18,6 +18,7 @@ seeds = 5
 stay = 0.99
 per = "update"
 units = "live"
+as_in_paper = false              # true: the grid alone, without the system of `placerec learn` beside it
 """
 
 import tomllib
@@ -56,6 +57,7 @@ class Config:
     stay: float
     per: str
     units: str
+    as_in_paper: bool
 
     def tokens_folder(self, size: int, seed: int) -> Path:
         """Where the token streams are that were made before for this size and seed."""
@@ -121,6 +123,7 @@ _TABLES = {
         "stay": _Key(_share, STAY, many=False),
         "per": _Key(_choice(*PER), "update", many=False),
         "units": _Key(_choice(*UNITS), "live", many=False),
+        "as_in_paper": _Key(lambda value: "" if isinstance(value, bool) else "write true or false", False, many=False),
     },
 }
 

@@ -30,13 +30,17 @@ _BASELINES = (
     ("majority", "always the most frequent place", ":"),
     ("frame_wise", "each frame alone (naive Bayes)", "--"),
 )
+_LEARNED = "placerec learn (several dictionaries, weighed)"
 
 
-def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, narrow: bool = False) -> None:
+def draw_figure(
+    rows: Sequence[Row], plan: Config, path: Path, *, title: str, learned: Sequence[float] = (), narrow: bool = False
+) -> None:
     """Draw the rows of one kind of transition: dots are means over seeds, the lines on them one standard deviation.
 
-    Sizes are rows and smoothings columns of panels; `narrow`: all in one column. PNG or SVG by suffix;
-    MissingExtraError without matplotlib.
+    Sizes are rows and smoothings columns of panels; `narrow`: all in one column. `learned`: the share
+    of frames that the system of `placerec learn` has right with each seed, none where it was not run. PNG or SVG by
+    suffix; MissingExtraError without matplotlib.
     """
     panels = list(product(plan.size, plan.smoothing))
     columns = 1 if narrow else len(plan.smoothing)
@@ -44,6 +48,7 @@ def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, na
     accuracy = by_seed(rows)
     baselines = {kind: by_seed(rows, attrgetter(kind)) for kind, _, _ in _BASELINES}
     values = [np.mean(seeds) for table in (accuracy, *baselines.values()) for seeds in table.values()]
+    values += [np.mean(learned)] if learned else []
     lowest = max(0.0, 10 * math.floor(10 * min(values)) - 2)
     width = 4.6 if narrow else _PANEL_WIDTH * columns
     with figure_file(path, width, _PANEL_HEIGHT * lines + (1.9 if narrow else 1.3), "constrained") as figure:
@@ -54,6 +59,9 @@ def draw_figure(rows: Sequence[Row], plan: Config, path: Path, *, title: str, na
             for kind, label, style in _BASELINES:
                 level = 100 * float(np.mean([np.mean(baselines[kind][setting]) for setting in settings]))
                 axes.axhline(level, linestyle=style, color="0.25", linewidth=1.1, label=label, zorder=1)
+            if learned:
+                level = 100 * float(np.mean(learned))
+                axes.axhline(level, linestyle="-.", color="0.25", linewidth=1.1, label=_LEARNED, zorder=1)
             _dots(axes, own, plan, accuracy)
             axes.set_title(f"S = {size}, {smoothing}", loc="left", fontsize=10)
             axes.set_ylim(lowest, 100.5)

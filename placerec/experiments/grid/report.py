@@ -4,6 +4,7 @@ import platform
 import shlex
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from os.path import relpath
 from pathlib import Path
@@ -17,7 +18,7 @@ from placerec.experiments.grid.cells import GridCell, GridJob, believe_cell
 from placerec.experiments.grid.claims import CANNOT_TELL, FAILS, HIGH, HOLDS, NOT_TRIED, Claim, Statement, judge
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
-from placerec.experiments.grid.results import Results, Row, Setting, by_seed
+from placerec.experiments.grid.results import LEARNED_CSV, Results, Row, Setting, by_seed
 from placerec.experiments.store import key_of, load, save
 from placerec.figures.pages import Mark, heading, html_page, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
@@ -28,7 +29,10 @@ from placerec.version import __version__
 from placerec.vision import Descriptors, Dictionary
 
 PAPER_RUNS = {10: "3.15", 20: "2.67"}
-_CAPTION = "Mean over seeds, with one standard deviation. Dotted: always the most frequent place. Dashed: naive Bayes."
+_CAPTION = (
+    "Mean over seeds, with one standard deviation. Dotted: always the most frequent place. Dashed: naive Bayes. "
+    "Dash-dotted, if it is there: placerec learn, whose dictionaries and weights are not the paper's."
+)
 _PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib")
 _MARKS: Mapping[str, Mark] = {HOLDS: "yes", FAILS: "no", CANNOT_TELL: "open", NOT_TRIED: "none"}
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
@@ -58,18 +62,27 @@ def runs_table(rows: Iterable[Row]) -> Table:
 
 
 def best_table(results: Results, most: int = 10) -> Table:
-    """The best settings, with baselines: percent of the frames, mean and standard deviation over seeds."""
+    """The best settings, with baselines: percent of the frames, mean and standard deviation over seeds.
+
+    Before them, if it was run, what `placerec learn` makes.
+    """
     tables = [
         by_seed(results.rows, share) for share in (lambda o: o.right, lambda o: o.frame_wise, lambda o: o.majority)
     ]
-    lines = []
+    lines: list[Sequence[str]] = []
+    if learned := results.learned_by_seed():
+        lines.append(("several", "placerec learn", "none", "2", "learned", _percent(learned), "", ""))
     for setting in ranked(results)[:most]:
-        right, alone, majority = (100 * np.array(table[setting]) for table in tables)
-        spread = f" ± {right.std(ddof=1):.1f}" if len(right) > 1 else ""
+        right, alone, majority = (table[setting] for table in tables)
         names = str(setting.size), setting.smoothing, setting.select, str(setting.order), setting.transition
-        lines.append((*names, f"{right.mean():.1f}{spread}", f"{alone.mean():.1f}", f"{majority.mean():.1f}"))
+        lines.append((*names, _percent(right), f"{100 * np.mean(alone):.1f}", f"{100 * np.mean(majority):.1f}"))
     names_ = ("S", "smoothing", "select", "n", "transition")
     return (*names_, "frames right, %", "each frame alone, %", "most frequent place, %"), lines
+
+
+def _percent(seeds: Sequence[float]) -> str:
+    spread = f" ± {100 * np.std(seeds, ddof=1):.1f}" if len(seeds) > 1 else ""
+    return f"{100 * np.mean(seeds):.1f}{spread}"
 
 
 def ranked(results: Results) -> list[Setting]:
@@ -160,7 +173,8 @@ def write_reports(results: Results, plan: Config, config: Path, jobs: Sequence[G
 
 def _key(config: Path, jobs: Sequence[GridJob], out: Path) -> str:
     """A digest of all that the report depends on."""
-    rows = [content_digest_of_file(out / name, ExperimentError) for name in ("results.csv", "sequences.csv")]
+    names = [name for name in ("results.csv", "sequences.csv", LEARNED_CSV) if (out / name).exists()]
+    rows = [content_digest_of_file(out / name, ExperimentError) for name in names]
     made_of = [(job.work.kept.name, job.images.folder.name if job.images else "") for job in jobs]
     return key_of("report", rows, made_of, str(config), read_text(config, ExperimentError), str(out), _versions())
 
@@ -180,7 +194,7 @@ def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob]
         paragraph(_what(results, plan, config)),
         heading("Frames right"),
         *_figures(results, plan, out),
-        table(*best_table(results), "The ten best of the grid, with what is right without any filter."),
+        table(*best_table(results), _best_caption(results)),
         heading("The paper's claims"),
         table(*verdicts_table(claims), "Verdicts; the numbers are below.", marks=_MARKS),
         paragraph(note),
@@ -195,9 +209,24 @@ def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob]
         preformatted(read_text(config, ExperimentError)),
         paragraph(f"The best way of the grid, step by step ({best}; seed 0):"),
         preformatted(commands_of(plan, best, _of(jobs, best)[0])),
+        *_learning(plan, results, jobs[0]),
         preformatted(_versions()),
     ]
     write_text(out / "report.html", html_page(f"placerec experiment: {config.stem}", body))
+
+
+def _best_caption(results: Results) -> str:
+    caption = "The ten best of the grid, with what is right without any filter."
+    return f"What placerec learn makes of the same images, and t{caption[1:]}" if results.learned else caption
+
+
+def _learning(plan: Config, results: Results, job: GridJob) -> Iterator[str]:
+    """How the system of `placerec learn` is run on the fold of a job."""
+    if results.learned and job.images is not None:
+        yield paragraph("The system of placerec learn (seed 0):")
+        sources = [[_from(plan, one.sequence.source) for one in part] for part in (job.images.train, job.images.test)]
+        tests = " ".join(f"--test {shlex.quote(test)}" for test in sources[1])
+        yield preformatted(f"placerec learn {_listed(sources[0])} -o learned/ --seed {job.seed} {tests}")
 
 
 def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
@@ -207,11 +236,12 @@ def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
     for number, transition in enumerate(plan.transition):
         rows, title = [row for row in results.rows if row.transition == transition], f"{transition} transitions"
         path = out / f"figure{f'-{transition}' if number else ''}.svg"
-        draw_figure(rows, plan, path, title=title)
-        draw_figure(rows, plan, path.with_suffix(".png"), title=title)
+        draw = partial(draw_figure, rows, plan, title=title, learned=results.learned_by_seed())
+        draw(path)
+        draw(path.with_suffix(".png"))
         with tempfile.TemporaryDirectory() as folder:
             narrow = Path(folder) / "narrow.png"
-            draw_figure(rows, plan, narrow, title=title, narrow=True)
+            draw(narrow, narrow=True)
             yield picture(path.with_suffix(".png"), f"Accuracy by n, {title}", _CAPTION, narrow=narrow)
 
 

@@ -2,6 +2,7 @@
 
 results.csv    the columns of `COLUMNS`, sorted by the first seven
 sequences.csv  how many frames of each test sequence were right: what the intervals are computed from
+learned.csv    what `placerec learn` makes of each seed and fold, unless all is as in the paper
 
 `Scores` are the accuracies over all frames, and what they would be with other test sequences. Frames of one sequence
 resemble each other, so sequences are drawn, with replacement, and all of their frames with them. Every cell sees the
@@ -27,6 +28,7 @@ COLUMNS = (
     *("frames", "accuracy", "balanced_accuracy", "majority_accuracy", "same_word_run", "frame_wise_accuracy"),
     *("change_latency_frames", "log_loss", "ece"),
 )
+LEARNED_CSV = "learned.csv"
 SEQUENCE_COLUMNS = (*_CELL, "sequence", "frames", "right", "frame_wise_right", "majority_right", "late")
 
 
@@ -89,12 +91,44 @@ class Setting(NamedTuple):
         return f"S = {self.size}, {self.smoothing}, {self.select}, n = {self.order}, {self.transition} transitions"
 
 
+class LearnedRow(NamedTuple):
+    """What the system of `placerec learn` does on a fold, with dictionaries of a seed; a line of learned.csv.
+
+    `right` of `frames` labelled test frames; shares are from 0 to 1. `alpha` and `memory`: what was learned of weights.
+    """
+
+    seed: int
+    fold: str
+    frames: int
+    right: int
+    accuracy: float
+    balanced_accuracy: float
+    change_latency_frames: float | None
+    log_loss: float
+    ece: float
+    alpha: float
+    memory: float
+
+
 @dataclass(frozen=True)
 class Results:
-    """All rows, in the order of results.csv, and by fold and split (train, test) the labelled images per place."""
+    """All rows, in the order of results.csv, and by fold and split (train, test) the labelled images per place.
+
+    `learned`: the rows of learned.csv, none where that is not asked for.
+    """
 
     rows: Sequence[Row] = field(repr=False)
     folds: Mapping[str, Mapping[str, Mapping[str, int]]] = field(repr=False)
+    learned: Sequence[LearnedRow] = field(default=(), repr=False)
+
+    def learned_by_seed(self) -> list[float]:
+        """Of `learned` the share of the frames of all folds that are right, from 0 to 1: one number a seed."""
+        counts: dict[int, list[int]] = {}
+        for row in self.learned:
+            total = counts.setdefault(row.seed, [0, 0])
+            total[0] += row.right
+            total[1] += row.frames
+        return [right / frames for right, frames in counts.values()]
 
 
 def by_seed(
@@ -121,11 +155,19 @@ def write_results(results: Results, out: Path) -> None:
     write_text(out / "sequences.csv", _csv(SEQUENCE_COLUMNS, counts))
 
 
+def write_learned(rows: Sequence[LearnedRow], out: Path) -> None:
+    """Write learned.csv into `out`; without rows there is none."""
+    if rows:
+        write_text(out / LEARNED_CSV, _csv(LearnedRow._fields, (map(_cell, row) for row in rows)))
+    else:
+        (out / LEARNED_CSV).unlink(missing_ok=True)
+
+
 def _cell(value: object) -> object:
     return f"{value:.6f}" if isinstance(value, float) else "" if value is None else value
 
 
-def _csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+def _csv(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([header, *rows])
     return text.getvalue()

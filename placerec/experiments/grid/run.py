@@ -3,6 +3,7 @@
 import glob
 import logging
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from operator import attrgetter
@@ -12,8 +13,9 @@ from typing import Any
 from placerec.errors import ExperimentError
 from placerec.experiments.grid.cells import KEPT, CellJob, GridCell, GridJob, run_cells
 from placerec.experiments.grid.config import Config, read_config
+from placerec.experiments.grid.learned import learn_folds
 from placerec.experiments.grid.report import write_reports
-from placerec.experiments.grid.results import COLUMNS, Results, Row, SequenceCount, write_results
+from placerec.experiments.grid.results import COLUMNS, Results, Row, SequenceCount, write_learned, write_results
 from placerec.experiments.grid.splits import SPLITS, Fold, named_tests
 from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, make_tokens
 from placerec.figures.canvas import check_figure
@@ -33,6 +35,9 @@ log = logging.getLogger(__name__)
 def experiment(config: Path | str, out: Path | str, *, jobs: int = 1, progress: ProgressBar = silent) -> Results:
     """`placerec experiment`: run the grid of a TOML file (`read_config`) and write all that is known to `out`.
 
+    The system of `placerec learn` is run beside the grid, unless the file asks for all `as_in_paper` or names token
+    streams in place of images.
+
     What `out`/cache holds from runs before is used again; the results are the same for any number of `jobs`
     (processes). `progress(label)` is a context manager that gives a callback(done, total). Raises ExperimentError for
     a config that cannot be used, OutputError if another run is at work in `out`, and what the commands raise that it
@@ -43,6 +48,9 @@ def experiment(config: Path | str, out: Path | str, *, jobs: int = 1, progress: 
     plan = read_config(config)
     with held_output(out, out / "cache"):
         todo, results = run_grid(plan, out, jobs=jobs, progress=progress)
+        learned = [] if plan.as_in_paper else learn_folds(todo, jobs=jobs, progress=progress)
+        write_learned(learned, out)
+        results = replace(results, learned=learned)
         write_reports(results, plan, Path(config), todo, out)
     return results
 
