@@ -33,7 +33,7 @@ from placerec.cli import shared
 )
 @shared.reading_options()
 @shared.output_option(
-    "out/", "The folder to write: methods.csv, pairs.csv, methods.png and .svg, beliefs/; a second run goes on there."
+    "out/", "The folder to write: methods.csv, pairs.csv, methods.png and .svg, report.html, beliefs/; more runs go on."
 )
 @shared.talk_options
 def compare(

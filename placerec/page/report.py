@@ -18,11 +18,11 @@ from placerec.figures.canvas import place_title
 from placerec.figures.evaluation import plot_evaluation, read_files
 from placerec.figures.pages import html_page, paragraph, picture, table
 from placerec.files import write_text
-from placerec.frames import SourceOptions, find_sequences
+from placerec.frames import Sequence as FrameSequence, SourceOptions, find_sequences
 from placerec.hohmm.beliefs import Beliefs
 from placerec.hohmm.explain import EXPLAINED
 from placerec.inspection.decision import read_decisions
-from placerec.jobs import ProgressBar, silent
+from placerec.jobs import Progress, ProgressBar, silent
 from placerec.page import assets
 from placerec.page.drives import Drive, group_files, json_in_page, pack_drive
 from placerec.page.pictures import pictures_of, sequences_of
@@ -90,6 +90,11 @@ def report_page(
     """
     judged = judge(drives)
     body = [*headline(drives, judged), *intro, explorer(drives, shown), *_still(drives, judged), *more]
+    return page_with_explorer(title, body)
+
+
+def page_with_explorer(title: str, body: Iterable[str]) -> str:
+    """The HTML of a page that holds one `explorer` among the pieces of its `body`."""
     style = assets.text("page.css") + assets.text("report.css")
     return html_page(title, body, style=style, script=assets.in_one("report.js"))
 
@@ -167,6 +172,11 @@ def _still(drives: Sequence[Drive], judged: Mapping[str, Evaluation]) -> list[st
             return []
         drawn = picture(path, "Belief over time, confusion matrix, calibration", name)
     return [f'<div class="still">{drawn}</div>']
+
+
+def shown_of(drives: Sequence[Drive], sequences: Mapping[str, FrameSequence], progress: Progress | None) -> Shown:
+    """The pictures of drives whose images are those of `sequences`, by the drives' names."""
+    return Shown(pictures_of(drives, sequences, wanted_frames(drives, {}), progress))
 
 
 def wanted_frames(drives: Sequence[Drive], tiles: Mapping[str, tuple[str, int]]) -> dict[str, list[int]]:

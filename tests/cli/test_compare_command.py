@@ -34,7 +34,11 @@ def test_it_prints_a_table_and_writes_the_folder(runs: Path, tmp_path: Path) -> 
         "methods.png",
         "methods.svg",
         "pairs.csv",
+        "report.html",
     ]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert '"systems":["hohmm","majority"]' in page
+    assert page.count("data:image/webp") == 12
 
 
 @pytest.mark.parametrize(

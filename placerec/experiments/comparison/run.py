@@ -3,6 +3,7 @@
 OUT/methods.csv             a line per method
 OUT/pairs.csv               for every two methods whether their difference holds
 OUT/methods.png, .svg       accuracy and cost
+OUT/report.html             the test sequences as every method saw them, to point at
 OUT/beliefs/METHOD/         the beliefs, one file per test sequence, and run.json: what they were made of
 OUT/cache/                  what a second run does not do again: descriptors, words, models
 """
@@ -26,6 +27,7 @@ from placerec.experiments.comparison.benchmark import (
     train_models,
 )
 from placerec.experiments.comparison.figure import plot_comparison
+from placerec.experiments.comparison.page import comparison_page
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
 from placerec.experiments.several import learn_several
 from placerec.experiments.store import Described, WordsJob, describe_all, held_output, keep_given, key_of, load
@@ -109,6 +111,9 @@ def compare(
         write_text(out / "pairs.csv", format_pairs(found.pairs))
         for suffix in (".png", ".svg"):
             plot_comparison(found, out / f"methods{suffix}")
+        with progress("pictures") as show:
+            page = comparison_page(found, runs, given.tests, out / "methods.svg", show)
+        write_text(out / "report.html", page)
     _tell(out, found)
     return found
 

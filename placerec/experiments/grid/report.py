@@ -20,11 +20,13 @@ from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
 from placerec.experiments.grid.results import LEARNED_CSV, Results, Row, Setting, by_seed
 from placerec.experiments.store import key_of, load, save
-from placerec.figures.pages import Mark, heading, html_page, paragraph, picture, preformatted, table
+from placerec.figures.pages import Mark, heading, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
 from placerec.hohmm import Beliefs
 from placerec.inspection.word_sheet import draw_word_sheet
 from placerec.inspection.words import typical_images, word_table
+from placerec.page.drives import drives_of
+from placerec.page.report import explorer, page_with_explorer, shown_of
 from placerec.version import __version__
 from placerec.vision import Descriptors, Dictionary
 
@@ -212,7 +214,7 @@ def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob]
         *_learning(plan, results, jobs[0]),
         preformatted(_versions()),
     ]
-    write_text(out / "report.html", html_page(f"placerec experiment: {config.stem}", body))
+    write_text(out / "report.html", page_with_explorer(f"placerec experiment: {config.stem}", body))
 
 
 def _best_caption(results: Results) -> str:
@@ -270,19 +272,19 @@ def _beliefs(jobs: Sequence[GridJob], setting: Setting) -> list[Beliefs]:
 def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
     """Belief strips and confusion matrices of the best setting, and its words."""
     best = ranked(results)[0]
-    beliefs = _beliefs(jobs, best)
-    found = {best: evaluate(beliefs)}
     first = best._replace(order=min(row.order for row in results.rows))
-    if first != best:
-        found[first] = evaluate(_beliefs(jobs, first))
+    of = {setting: _beliefs(jobs, setting) for setting in dict.fromkeys((best, first))}
+    found = {setting: evaluate(beliefs) for setting, beliefs in of.items()}
+    drives = drives_of({str(setting): beliefs for setting, beliefs in of.items()})
+    tests = [one.sequence for job in _of(jobs, best) if job.images for one in job.images.test]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         yield heading("Belief over time")
         caption = f"The sequences with the most and the fewest frames right: {best}, seed 0."
-        strips, narrow = folder / "strips.png", folder / "narrow.png"
-        draw_strips(beliefs, found[best], strips, 11)
-        draw_strips(beliefs, found[best], narrow, 5)
-        yield picture(strips, "Beliefs of two test sequences", caption, narrow=narrow)
+        strips = folder / "strips.png"
+        draw_strips(of[best], found[best], strips, 11)
+        yield explorer(drives, shown_of(drives, {one.name: one for one in tests}, None))
+        yield f'<div class="still">{picture(strips, "Beliefs of two test sequences", caption)}</div>'
         yield heading("What is confused")
         for number, (setting, evaluation) in enumerate(found.items()):
             path = folder / f"confusion{number}.png"

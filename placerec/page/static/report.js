@@ -9,6 +9,7 @@ import { createStrip } from "./strip.js";
 const BELIEF = 44;
 const DECIDED = 13;
 const MARKS = 7;
+const MANY = 6; // more drives than this are a list of their own to scroll through
 
 const data = unpackReport(document.getElementById("data").textContent);
 const state = { drive: 0, frame: 0, a: 0, b: -1, kind: "all", place: -1 };
@@ -19,7 +20,7 @@ function start() {
   const host = document.getElementById("report");
   shown.controls = make("div", "bar controls");
   shown.legend = make("div", "bar legend");
-  shown.drives = make("div", "drives");
+  shown.drives = make("div", data.drives.length > MANY ? "drives many" : "drives");
   shown.moment = make("aside", "moment");
   shown.moment.setAttribute("aria-label", "The moment that is pointed at");
   host.replaceChildren(shown.controls, shown.legend, make("div", "columns", shown.drives, shown.moment), keysHelp());
