@@ -29,6 +29,8 @@ from placerec.lm.trie import Trie
 from placerec.lm.vocabulary import Vocabulary
 
 log = logging.getLogger(__name__)
+# Rows whose numbers are looked up at once.
+_PART = 1 << 17
 # No file has 10^18 n-grams; of more digits Python may not make a number.
 _COUNT = re.compile(r"ngram\s+(\d{1,18})\s*=\s*(\d{1,18})\s*", re.ASCII)
 _NUMBER = re.compile(r"[-+.0-9A-Za-z]+")
@@ -68,15 +70,16 @@ def row_blocks(
     rank = np.zeros(1, np.int64)
     for n in range(1, trie.order + 1):
         yield f"\n\\{n}-grams:".encode()
-        word = trie.word(n)
         # SRILM sorts by the context, read from its last word to its first, then by the word.
-        rows, before = _regrouped(trie.prefix(n), rank) if n > 1 else (word, np.zeros_like(word))
-        word = word[rows]
-        shown = slice(None) if stored is None else np.flatnonzero(stored[n - 1][rows])
-        row = rows[shown]
-        log10_p, backoff, has_weight = log10_probs[n - 1][row], backoffs[n - 1][row], weighted[n - 1][row]
-        yield from lines.blocks(log10_p, backoff, has_weight, before[shown], word[shown])
+        rows, before = _regrouped(trie.prefix(n), rank) if n > 1 else (trie.keys[0], np.zeros(len(words), np.int64))
+        for first in range(0, len(rows), _PART):
+            row, context = rows[first : first + _PART], before[first : first + _PART]
+            if stored is not None and not (shown := stored[n - 1][row]).all():
+                row, context = row[shown], context[shown]
+            columns = log10_probs[n - 1][row], backoffs[n - 1][row], weighted[n - 1][row]
+            yield from lines.blocks(*columns, context, trie.keys[n - 1][row] % len(words))
         if n < trie.order:
+            word = trie.word(n)[rows]
             by_word = np.argsort(_narrow(word, len(words)), kind="stable")
             lines = lines.longer(before[by_word], word[by_word])
             rank = np.empty(len(rows), np.int64)
@@ -88,12 +91,13 @@ def row_blocks(
 def _regrouped(prefix: Ints, rank: Ints) -> tuple[Ints, Ints]:
     """The rows (m,) of ascending prefix rows (m,) so that the prefixes' ranks (p,) ascend, and those ranks (m,)."""
     sizes = np.bincount(prefix, minlength=len(rank))
-    starts = np.cumsum(sizes) - sizes
-    moved, start = np.empty_like(sizes), np.empty_like(starts)
-    moved[rank], start[rank] = sizes, starts
-    shift = start - (np.cumsum(moved) - moved)
+    moved, shift = np.empty_like(sizes), np.empty_like(sizes)
+    moved[rank], shift[rank] = sizes, np.cumsum(sizes) - sizes
+    shift -= np.cumsum(moved) - moved
     before = np.repeat(np.arange(len(rank)), moved)
-    return np.arange(len(prefix)) + shift[before], before
+    rows = shift[before]
+    rows += np.arange(len(prefix))
+    return rows, before
 
 
 def _narrow(word: Ints, size: int) -> NDArray[np.integer]:

@@ -82,7 +82,12 @@ class PackedLines:
 
     def longer(self, before: Ints, word: Ints) -> "PackedLines":
         """The lines of the next order, whose contexts (c,) are contexts of this one with a word added."""
-        return PackedLines(self.words, np.concatenate([self.contexts[before], self.words[word]], axis=1))
+        contexts = np.empty((len(word), self.contexts.shape[1] + self.words.shape[1]), _CELL)
+        for start in range(0, len(word), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            contexts[block, : self.contexts.shape[1]] = self.contexts[before[block]]
+            contexts[block, self.contexts.shape[1] :] = self.words[word[block]]
+        return PackedLines(self.words, contexts)
 
 
 def first_lines(words: Sequence[str], encoding: str) -> PlainLines | PackedLines:

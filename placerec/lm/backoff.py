@@ -10,7 +10,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import LanguageModelError, refuse_string
 from placerec.lm.score import Contexts, Ngrams, ScoreTables, build_tables
-from placerec.lm.trie import Trie, distinct
+from placerec.lm.trie import Trie, united_trie
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN, Vocabulary
 
 if TYPE_CHECKING:
@@ -162,7 +162,8 @@ class ModelUnion:
 
 def unite_models(models: Sequence[BackoffModel]) -> ModelUnion:
     """C models as one: a look-up answers for all of them; a word that a model does not list has -inf under it."""
-    trie = _united([model.trie.with_endings() for model in models])
+    tries = [model.trie.with_endings() for model in models]
+    trie = united_trie(Vocabulary.of(word for trie in tries for word in trie.vocabulary.words), tries)[0]
     log10_p, weights = _columns(trie, models)
     for n in range(2, trie.order + 1):
         # By back-off where a model does not list an n-gram.
@@ -173,22 +174,6 @@ def unite_models(models: Sequence[BackoffModel]) -> ModelUnion:
         for n, (p, weight) in enumerate(zip(log10_p, weights, strict=True), start=1)
     ]
     return ModelUnion(trie.vocabulary.index, build_tables(len(trie.vocabulary), orders))
-
-
-def _united(tries: Sequence[Trie]) -> Trie:
-    """The trie of all n-grams of all `tries`."""
-    vocabulary = Vocabulary.of(word for trie in tries for word in trie.vocabulary.words)
-    words = [vocabulary.ids(trie.vocabulary.words) for trie in tries]
-    keys, rows = [np.arange(len(vocabulary))], words
-    for n in range(2, max(trie.order for trie in tries) + 1):
-        # Numbers grow in the order of the text in every trie, so that each one's keys stay sorted.
-        wanted = [
-            row[trie.prefix(n)] * len(vocabulary) + word[trie.word(n)] if n <= trie.order else np.zeros(0, np.int64)
-            for trie, word, row in zip(tries, words, rows, strict=True)
-        ]
-        keys.append(distinct(wanted))
-        rows = [np.searchsorted(keys[-1], key) for key in wanted]
-    return Trie(vocabulary, tuple(keys))
 
 
 def _columns(trie: Trie, models: Sequence[BackoffModel]) -> tuple[list[Floats], list[Floats]]:

@@ -16,7 +16,7 @@ from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.logs import EPSILON, log10, p_of
 from placerec.lm.score import Ngrams, ScoreTables, build_tables
-from placerec.lm.trie import Trie, closed_trie, per_context
+from placerec.lm.trie import Trie, per_context, united_trie
 from placerec.lm.vocabulary import Vocabulary
 
 
@@ -199,21 +199,15 @@ def unite(
 
     `predictable` bool (V,), `alias_counts` int64 (V,): fields of MutableModel.
     """
-    order = max(model.order for model in models)
-    groups = []
-    for model in models:
-        renumbered = vocabulary.ids(model.trie.vocabulary.words)
-        groups += [renumbered[model.trie.matrix(n)] for n in range(1, model.order + 1)]
-    trie, rows = closed_trie(vocabulary, order, groups)
-    united, place = [], iter(rows)
-    for model in models:
+    trie, rows = united_trie(vocabulary, [model.trie for model in models])
+    united = []
+    for model, row_of in zip(models, rows, strict=True):
         wider = MutableModel(trie, predictable, np.zeros(0, np.int64) if alias_counts is None else alias_counts)
-        for n in range(1, model.order + 1):
-            row = next(place)[-1]
-            wider.stored[n - 1][row] = model.stored[n - 1]
-            wider.log10_p[n - 1][row] = model.log10_p[n - 1]
-            wider.is_context[n - 1][row] = model.is_context[n - 1]
-            wider.backoff[n - 1][row] = model.backoff[n - 1]
+        for n, row in enumerate(row_of[: model.order]):
+            wider.stored[n][row] = model.stored[n]
+            wider.log10_p[n][row] = model.log10_p[n]
+            wider.is_context[n][row] = model.is_context[n]
+            wider.backoff[n][row] = model.backoff[n]
         wider.refresh_all()
         united.append(wider)
     return united

@@ -11,6 +11,8 @@ _FACTOR = np.uint64(0x9E3779B97F4A7C15)
 _INVERSE = np.uint64(pow(int(_FACTOR), -1, 1 << 64))
 # Slots for each key, up to so many bits: where that is still in a cache, more room leaves fewer keys to one slot.
 _ROOM = (2, 64), (4, 19), (32, 15)
+# Keys that are put in at once: what is computed on the way stays in the processor's cache.
+_PART = 1 << 15
 
 
 class RowIndex:
@@ -26,16 +28,23 @@ class RowIndex:
         self._shift, self._width = np.uint64(64 - bits), np.uint64(bits)
         # A free slot holds a place that there is not.
         self._slots = np.full(1 << bits, (1 << bits) - 1, np.uint64)
-        slot, above = self._hashed(keys)
-        places = np.arange(self._size).view(np.uint64)
+        parts = [slice(start, min(start + _PART, self._size)) for start in range(0, self._size, _PART)]
+        for part in parts:
+            slot, above = self._hashed(keys[part])
+            self._slots[slot] = above | _places(part)
         # Of several keys for one slot the last is kept; the others, but for its equals, go to a table of their own.
-        self._slots[slot] = above | places
-        kept = self._slots[slot] ^ above
-        self._lost = np.flatnonzero(kept >= self._size)
+        lost, others = [np.zeros(0, np.int64)], 0
         self._contested = np.zeros(1 << bits, bool)
-        self._contested[slot[self._lost]] = True
+        for part in parts:
+            slot, above = self._hashed(keys[part])
+            kept = self._slots[slot] ^ above
+            others += int(np.count_nonzero(kept != _places(part)))
+            its = np.flatnonzero(kept >= self._size)
+            self._contested[slot[its]] = True
+            lost.append(its + part.start)
+        self._lost = np.concatenate(lost)
         self._rest = RowIndex(keys[self._lost]) if len(self._lost) else None
-        self.distinct: bool = np.count_nonzero(kept != places) == len(self._lost)
+        self.distinct: bool = others == len(self._lost)
         self.distinct &= self._rest is None or self._rest.distinct
 
     def _hashed(self, keys: Ints) -> tuple[Ints, NDArray[np.uint64]]:
@@ -85,3 +94,7 @@ class RowIndex:
         if self._rest is not None:
             keys[self._lost] = self._rest.keys()
         return keys
+
+
+def _places(part: slice) -> NDArray[np.uint64]:
+    return np.arange(part.start, part.stop).view(np.uint64)

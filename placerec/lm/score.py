@@ -52,12 +52,12 @@ class TokenSequence(NamedTuple):
 
 
 class Ngrams(NamedTuple):
-    """N-grams of one order: words int64 (m, n), log10 p and backoff weights (m,) or (m, C), which are contexts (m,).
+    """N-grams of one order: words, integers (m, n), log10 p and backoff weights (m,) or (m, C), contexts or not (m,).
 
     `listed` bool (m,): has a log10 p of its own, the others are contexts only; None: all have.
     """
 
-    words: Ints
+    words: NDArray[Any]
     log10_p: Values
     backoff: Values
     is_context: Mask
@@ -261,9 +261,9 @@ class ScoreTables:
         rows = [np.argsort(keys) for keys in codes]
         return [(keys[row], row) for keys, row in zip(codes, rows, strict=True)]
 
-    def codes(self, words: Ints) -> Ints:
-        """The codes (m,) of n-grams int64 (m, n)."""
-        codes = words[:, 0] + 1
+    def codes(self, words: NDArray[Any]) -> Ints:
+        """The codes (m,) of n-grams, integers (m, n)."""
+        codes = words[:, 0].astype(np.int64) + 1
         for table, word in zip(self.tables, words.T[1:], strict=False):
             codes = table.stems(codes) * (self.V + 1)
             codes += word

@@ -17,6 +17,12 @@ from placerec.arrays import Floats, Ints, Mask
 from placerec.lm.row_index import RowIndex
 from placerec.lm.vocabulary import Vocabulary
 
+# Integers of any type.
+Numbers = NDArray[Any]
+_NO_ROWS = np.zeros(0, np.int64)
+# Rows that are looked up at once: what is computed on the way stays in the processor's cache.
+_PART = 1 << 15
+
 
 @dataclass(frozen=True)
 class Trie:
@@ -67,15 +73,18 @@ class Trie:
         """
         found = [np.zeros(len(self.vocabulary), np.int64)]
         for n in range(2, self.order + 1):
-            word = self.word(n)
-            found.append(word if n == 2 else self._find_all(n - 1, found[n - 2][self.prefix(n)], word))
+            found.append(self.word(n) if n == 2 else self._without_first(n, found[n - 2]))
         return tuple(found)
 
-    def _find_all(self, n: int, prefix: Ints, word: Ints) -> Ints:
-        """What `find` gives, sooner for about as many n-grams as there are."""
-        wanted = prefix * len(self.vocabulary) + word
-        wanted[prefix < 0] = -1
-        return RowIndex(self.keys[n - 1]).find(wanted)
+    def _without_first(self, n: int, shorter: Ints) -> Ints:
+        """The `suffixes` of order n; `shorter` are those of order n-1."""
+        index, size = RowIndex(self.keys[n - 2]), len(self.vocabulary)
+        rows = np.empty(len(self.keys[n - 1]), np.int64)
+        for start in range(0, len(rows), _PART):
+            keys = self.keys[n - 1][start : start + _PART]
+            ending = shorter[keys // size]
+            rows[start : start + _PART] = index.find(np.where(ending >= 0, ending * size + keys % size, -1))
+        return rows
 
     @property
     def closed(self) -> bool:
@@ -142,7 +151,7 @@ def runs(values: Ints) -> tuple[Ints, Ints]:
 
 def distinct(keys: Sequence[Ints]) -> Ints:
     """The distinct numbers of all `keys`, ascending, int64 (m,)."""
-    return runs(np.sort(np.concatenate([np.zeros(0, np.int64), *keys])))[0]
+    return runs(np.sort(np.concatenate([_NO_ROWS, *keys])))[0]
 
 
 def per_context(prefix: Ints, size: int, values: NDArray[Any] | None = None) -> Floats:
@@ -150,39 +159,65 @@ def per_context(prefix: Ints, size: int, values: NDArray[Any] | None = None) -> 
     return np.bincount(prefix, weights=values, minlength=size).astype(np.float64)
 
 
-def build_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tuple[Trie, list[list[Ints]]]:
-    """The trie of n-grams, each group a matrix of word numbers int64 (m, n), n <= order, and of all their prefixes.
+def build_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Numbers]) -> tuple[Trie, list[list[Numbers]]]:
+    """The trie of n-grams, each group a matrix of word numbers, integers (m, n), n <= order, and of all their prefixes.
 
-    Also the rows int64 (m,) of every group's n-grams' prefixes: of length 1, 2, ..., n.
+    Also the rows, integers (m,), of every group's n-grams' prefixes: of length 1, 2, ..., n.
     """
     keys = [np.arange(len(vocabulary))]
     rows = [[matrix[:, 0]] for matrix in ngrams]
     for n in range(2, order + 1):
         wide = [i for i, matrix in enumerate(ngrams) if matrix.shape[1] >= n]
-        wanted = [rows[i][-1] * len(vocabulary) + ngrams[i][:, n - 1] for i in wide]
+        wanted = [rows[i][-1].astype(np.int64) * len(vocabulary) + ngrams[i][:, n - 1] for i in wide]
         # Mostly every prefix is an n-gram of its own: then there is less to sort.
         listed = distinct([key for i, key in zip(wide, wanted, strict=True) if ngrams[i].shape[1] == n])
-        found = list(map(RowIndex(listed).find, wanted))
+        index, narrow = RowIndex(listed), _narrow(listed)
+        found = [index.find(key).astype(narrow) for key in wanted]
         if any((row < 0).any() for row in found):
             listed = distinct(wanted)
-            found = [np.searchsorted(listed, key) for key in wanted]
+            narrow = _narrow(listed)
+            found = [np.searchsorted(listed, key).astype(narrow) for key in wanted]
         keys.append(listed)
         for i, row in zip(wide, found, strict=True):
             rows[i].append(row)
     return Trie(vocabulary, tuple(keys)), rows
 
 
-def endings(ngrams: Ints) -> list[Ints]:
+def _narrow(keys: Ints) -> type[np.signedinteger[Any]]:
+    """A type for the rows of these keys: they are many, and held for as long as a trie is made."""
+    return np.int32 if len(keys) < 1 << 31 else np.int64
+
+
+def endings(ngrams: Numbers) -> list[Numbers]:
     """The n-grams without their first word, without their first two, ...: matrices (m, n-1), ..., (m, 1)."""
     return [ngrams[:, start:] for start in range(1, ngrams.shape[1])]
 
 
-def closed_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints]) -> tuple[Trie, list[list[Ints]]]:
-    """The trie of n-grams, each group a matrix of word numbers int64 (m, n), of their prefixes and of their endings.
+def closed_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Numbers]) -> tuple[Trie, list[list[Numbers]]]:
+    """The trie of n-grams, each group a matrix of word numbers, integers (m, n), of all their prefixes and endings.
 
-    Also the rows int64 (m,) of every group's n-grams' prefixes: of length 1, 2, ..., n.
+    Also the rows, integers (m,), of every group's n-grams' prefixes: of length 1, 2, ..., n.
     """
     trie, rows = build_trie(vocabulary, order, ngrams)
     if not trie.closed:
         trie, rows = build_trie(vocabulary, order, [*ngrams, *(end for group in ngrams for end in endings(group))])
     return trie, rows[: len(ngrams)]
+
+
+def united_trie(vocabulary: Vocabulary, tries: Sequence[Trie]) -> tuple[Trie, list[list[Ints]]]:
+    """The trie of all n-grams of all `tries`, over `vocabulary`, which must list all their words.
+
+    Also the rows int64 (m_n,) of the n-grams of every trie: of length 1, 2, ...
+    """
+    words = [vocabulary.ids(trie.vocabulary.words) for trie in tries]
+    keys, rows = [np.arange(len(vocabulary))], [[word] for word in words]
+    for n in range(2, max(trie.order for trie in tries) + 1):
+        # Numbers grow in the order of the text in every trie, so that each one's keys stay sorted.
+        wanted = [
+            its[n - 2][trie.prefix(n)] * len(vocabulary) + word[trie.word(n)] if n <= trie.order else _NO_ROWS
+            for trie, word, its in zip(tries, words, rows, strict=True)
+        ]
+        keys.append(distinct(wanted))
+        for its, key in zip(rows, wanted, strict=True):
+            its.append(np.searchsorted(keys[-1], key))
+    return Trie(vocabulary, tuple(keys)), rows

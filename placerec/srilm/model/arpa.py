@@ -48,8 +48,8 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTi
     """
     vocabulary, sorted_number = reader.words.sorted()
     blocks = [(n, block) for n, its in sorted(reader.blocks.items()) for block in its]
-    groups = [sorted_number[block.words] for _, block in blocks]
-    trie, rows = closed_trie(vocabulary, reader.order, groups)
+    narrow = sorted_number.astype(np.int32)
+    trie, rows = closed_trie(vocabulary, reader.order, [narrow[block.words] for _, block in blocks])
     names = np.array(reader.words.names(vocabulary), np.int64)
     model = MutableModel(trie, ~vocabulary.mask(reader.words.non_events), names)
     created = _weights(model, blocks, rows)

@@ -6,9 +6,10 @@ not handled here: `parse_block` gives None, and the reader goes the long way, li
 
 import re
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LOG_ZERO
@@ -22,13 +23,13 @@ _NUMBER = re.compile(rb"-?\d+(\.\d*)?([eE][-+]?\d+)?")
 
 
 class Block(NamedTuple):
-    """N-grams of one order: line numbers (m,) from 1, words as SRILM's numbers (m, n), log10 p (m,), weights (m,).
+    """N-grams of one order: line numbers (m,) from 1, SRILM's numbers of words (m, n), log10 p (m,), weights (m,).
 
     `weighted` bool (m,): the line has a weight. `size`: how many lines there are, empty ones too.
     """
 
     lines: Ints
-    words: Ints
+    words: NDArray[Any]
     log10_p: Singles
     weighted: Mask
     backoff: Singles

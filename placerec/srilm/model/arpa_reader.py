@@ -180,7 +180,9 @@ class Reader:
     def keep(self, block: Block) -> None:
         """Keep n-grams of the present section."""
         if len(block.lines):
-            self.blocks.setdefault(self.section, []).append(block)
+            # All of them are held until the file is read.
+            narrow = block._replace(words=block.words.astype(np.int32))
+            self.blocks.setdefault(self.section, []).append(narrow)
 
     def keep_lines(self) -> None:
         """Keep, as one block, the n-grams that were read line by line."""

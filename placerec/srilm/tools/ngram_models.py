@@ -169,10 +169,7 @@ class Models:
         dynamic = options["bayes"] is not None or options["loglinear-mix"]
         if not dynamic:
             for k, component in enumerate(others, start=1):
-                read, its = self.read_component(component, "mix-lm file")
-                self.mutable, other = self.together(self.model(), read)
-                self.times = self.times_merged(self.mutable, other, its)
-                merge(self.mutable, other, merge_weight(weights, k), self.messages(self.mutable))
+                self.merge(component, merge_weight(weights, k))
         self.change()
         # SRILM's dynamic mixtures do not hand -skipoovs down.
         back = min(2, self.order - 1) if options["skipoovs"] and not (dynamic and others) else None
@@ -189,6 +186,14 @@ class Models:
             return partial(LogLinear, models, weights, self.words, self.debug, {})
         self.check_priors(weights)
         return partial(Mixture, models, weights, options["bayes"], options["bayes-scale"], self.debug >= 3)
+
+    def merge(self, component: Component, weight: float) -> None:
+        """Mix a component into the model, whose share is `weight`."""
+        read, its = self.read_component(component, "mix-lm file")
+        self.mutable, other = self.together(self.model(), read)
+        del read
+        self.times = self.times_merged(self.mutable, other, its)
+        merge(self.mutable, other, weight, self.messages(self.mutable))
 
     def check_priors(self, weights: Sequence[float]) -> None:
         """Say which weights of a mixture are none."""
