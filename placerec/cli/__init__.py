@@ -2,12 +2,14 @@
 
 import io
 import os
+import re
 import signal
 import sys
 from types import FrameType
 from typing import Any
 
 import click
+from click.exceptions import NoArgsIsHelpError
 
 from placerec.cli import experiments, images, learning, models, reports
 from placerec.cli.srilm import SRILM_COMMANDS
@@ -29,9 +31,31 @@ The same step by step:
 class Failure(click.ClickException):
     """An error as one line on stderr, and exit code 1."""
 
+    speaker = "placerec"
+
     def show(self, file: Any = None) -> None:
         line = self.message.replace("\r", "\\r").replace("\n", "\\n")
-        click.echo(f"placerec: {line}", file=file, err=True)
+        click.echo(f"{self.speaker}: {line}", file=file, err=True)
+
+
+class Misuse(Failure):
+    """Wrong usage as one line on stderr: the command, what is wrong, and an example or where to read; exit code 2."""
+
+    exit_code = 2
+
+    def __init__(self, error: click.UsageError, group: click.Context) -> None:
+        # Click names no context where an option is the last word and its value is missing.
+        context = error.ctx or group
+        asked = "" if error.ctx else f" {group.invoked_subcommand or ''}".rstrip()
+        self.speaker = f"{context.command_path}{asked}"
+        example = re.search("placerec .*", context.command.epilog or "")
+        of_argument = isinstance(getattr(error, "param", None), click.Argument)
+        if example and (of_argument or isinstance(error, click.MissingParameter)):
+            remedy = f"for example: {example[0]}"
+        else:
+            remedy = f"see `{self.speaker} --help`"
+        # Those of click end in a full stop, and have line ends where there are choices.
+        super().__init__(f"{' '.join(error.format_message().split()).removesuffix('.')}; {remedy}")
 
 
 # Commands by what people do; those of SRILM follow.
@@ -51,9 +75,19 @@ _NAMES = 17
 class Commands(click.Group):
     """The one place where what goes wrong becomes a line on stderr and an exit code."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except NoArgsIsHelpError:
+            raise
+        except click.UsageError as error:
+            raise Misuse(error, ctx) from error
+
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
+        except click.UsageError as error:
+            raise Misuse(error, ctx) from error
         except PlacerecError as error:
             raise Failure(str(error)) from error
         except KeyboardInterrupt as error:

@@ -33,11 +33,14 @@ def fails(message: str, *args: object) -> None:
 
 
 def misused(message: str, *args: object) -> None:
-    """Exit code 2, and a message on stderr."""
+    """Exit code 2, and a message that says what is wrong and where help is, in one line on stderr."""
     result = placerec(*args)
     assert result.exit_code == 2, result.output
     assert result.stdout == ""
-    assert message in result.stderr.splitlines()[-1], result.stderr
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("placerec")
+    assert message in line, line
+    assert re.search(r"; (for example: placerec |see `placerec.* --help`$)", line), line
 
 
 def make_words(root: Path) -> None:
