@@ -98,6 +98,11 @@ def refuse_string(words: object, error: type[PlacerecError]) -> None:
         raise error(f"{shown!r} is a string; a list of words, not a string, is needed here: split it")
 
 
+def counted(number: float, noun: str) -> str:
+    """A number of things as people say it: "1 frame", "2 frames", "1.5 frames"."""
+    return f"{number:.15g} {noun}{'' if number == 1 else 's'}"
+
+
 def at(path: "Path | str", line: int, message: str) -> str:
     """`message` with the position in front, as compilers print it."""
     return f"{path}:{line}: {message}"

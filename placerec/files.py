@@ -245,7 +245,8 @@ def _reading(path: Path, error: type[PlacerecError]) -> Iterator[None]:
 
 
 def _not_utf8(path: Path, line: int, byte: int) -> str:
-    return f"{path}:{line}: byte 0x{byte:02x} is not UTF-8; save the file as UTF-8"
+    remedy = "it holds arrays; name a text file" if path.suffix == ".npz" else "save the file as UTF-8"
+    return f"{path}:{line}: byte 0x{byte:02x} is not UTF-8; {remedy}"
 
 
 @contextmanager

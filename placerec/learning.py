@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from placerec.errors import counted
 from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.frames import SourceOptions
 from placerec.jobs import Executor, Progress
@@ -69,21 +70,19 @@ def format_learned(learned: Learned) -> str:
     made, evidence = learned.dictionaries, learned.evidence
     quality = made.dictionaries[0].quality
     sizes = ", ".join(f"{len(one.hits)} ({one.name or 'the first'})" for one in made.dictionaries)
+    learned_from = f"{counted(quality.used, 'frame')} of {counted(len(made.sequences), 'sequence')}"
     lines = [
-        f"words     {sizes}: learned from {quality.used} frames of {_sequences(len(made.sequences))}",
+        f"words     {sizes}: learned from {learned_from}",
         f"places    {len(evidence.frames)}: " + ", ".join(f"{place} {n}" for place, n in evidence.frames.items()),
         f"weights   {evidence}",
     ]
     found = learned.evaluation
     if found is not None:
         loss, majority = found.log_loss, found.majority_accuracy
+        tested = f"{counted(found.frames, 'frame')} of {counted(len(found.sequences), 'sequence')}"
         lines.append(
             f"tests     accuracy {100 * found.accuracy:.1f} % (majority class {100 * majority:.1f} %), log loss "
-            f"{loss:.3f}, ECE {found.ece:.3f} on {found.frames} frames of {_sequences(len(found.sequences))}"
+            f"{loss:.3f}, calibration error (ECE) {found.ece:.3f} on {tested}"
         )
     lines.append(f"model     {learned.out}: `placerec decode SOURCE -m {learned.out}` needs nothing else")
     return "\n".join(lines)
-
-
-def _sequences(count: int) -> str:
-    return f"{count} sequence{'s' * (count != 1)}"

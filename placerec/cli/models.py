@@ -10,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from placerec.cli import shared
+from placerec.errors import counted
 
 if TYPE_CHECKING:
     from placerec.model import Decoding, ModelOptions
@@ -120,9 +121,8 @@ def calibrate(model: Path, tokens: tuple[Path, ...], options: "Decoding") -> Non
     found = run(model, tokens, options=options)
     before, after = found.log_loss_before, found.log_loss_after
     click.echo(f"temperature  {found.temperature:.3f}   (above 1: the beliefs were too sure)")
-    click.echo(
-        f"log loss     {before:.3f} -> {after:.3f}   (nats per frame, {found.frames} frames: those it was fitted on)"
-    )
+    frames = f"{counted(found.frames, 'frame')}: those it was fitted on"
+    click.echo(f"log loss     {before:.3f} -> {after:.3f}   (nats per frame, {frames})")
 
 
 @shared.command(epilog=INSPECT_EXAMPLES)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from placerec.errors import counted
 from placerec.evaluation.confidence import COVERAGES, ECE_BINS
 from placerec.evaluation.metrics import Evaluation
 
@@ -32,16 +33,17 @@ def percent(share: float | None) -> str:
 
 def _overall(evaluation: Evaluation) -> list[str]:
     latency = evaluation.change_latency_frames
-    changes = f"{evaluation.changes} change{'' if evaluation.changes == 1 else 's'} of place"
-    delay = f"– ({changes})" if latency is None else f"{latency:g} frames, median of {changes}"
+    changes = f"{counted(evaluation.changes, 'change')} of place"
+    delay = f"– ({changes})" if latency is None else f"{counted(latency, 'frame')}, median of {changes}"
+    left_out = f", {evaluation.unlabelled} without a label left out" if evaluation.unlabelled else ""
     majority = f"always {shorten(evaluation.majority_place, _NAME_WIDTH)!r}: {percent(evaluation.majority_accuracy)}"
     half = percent(float(evaluation.risk_coverage.accuracy[COVERAGES.index(0.5)]))
     lines = [
-        f"frames             {evaluation.frames} judged, {evaluation.unlabelled} without a label left out",
+        f"frames             {evaluation.frames} judged{left_out}",
         f"accuracy           {percent(evaluation.accuracy)}   (majority class, {majority})",
         f"balanced accuracy  {percent(evaluation.balanced_accuracy)}   (mean recall of the places)",
         f"change latency     {delay}",
-        f"ECE                {evaluation.ece:.3f}   ({ECE_BINS} bins; 0 is calibrated)",
+        f"calibration error  {evaluation.ece:.3f}   (ECE: belief beside the share right, {ECE_BINS} bins; 0 is calibrated)",
         f"log loss           {evaluation.log_loss:.3f}   (nats per frame; 0 is best)",
         f"risk-coverage      {evaluation.risk_coverage.area:.3f}   (area; of the surest half {half} are right)",
     ]
@@ -53,7 +55,8 @@ def _new_places(evaluation: Evaluation) -> list[str]:
     if found is None:
         return []
     area = "–" if found.auroc is None else f"{found.auroc:.3f}"
-    return [f"unknown AUROC      {area}   ({found.new} frames of places without a column, {found.known} of others)"]
+    new = counted(found.new, "frame")
+    return [f"unknown AUROC      {area}   ({new} of places without a column, {found.known} of others)"]
 
 
 def _sequences(evaluation: Evaluation) -> list[str]:

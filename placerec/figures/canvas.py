@@ -71,9 +71,10 @@ def figure_file(path: Path | str, width: float, height: float, layout: _Layout |
     """
     path = Path(path)
     check_figure(path)
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    with _silent_matplotlib():
+        import matplotlib
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
 
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
@@ -148,6 +149,18 @@ def write_line(figure: "Figure", top: float, text: str, size: float, colour: str
     """A line of text at the left margin, its foot so many inches from the top of a figure; `size` in points."""
     width, height = figure.get_size_inches()
     figure.text(MARGIN / width, 1 - top / height, text, fontsize=size, color=colour)
+
+
+@contextmanager
+def _silent_matplotlib() -> Iterator[None]:
+    """matplotlib complains of a home that it may not write to, where it would keep a list of fonts; it does without."""
+    complaints = logging.getLogger("matplotlib")
+    level = complaints.level
+    complaints.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        complaints.setLevel(level)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from placerec.errors import EvaluationError
+from placerec.errors import EvaluationError, counted
 from placerec.evaluation.confidence import COVERAGES, ECE_BINS, NewPlaces, Reliability, RiskCoverage
 from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.evaluation.summary import percent, shorten
@@ -221,10 +221,10 @@ def _head(figure: "Figure", evaluation: Evaluation) -> None:
     majority = f"always “{shorten(evaluation.majority_place, 40)}”: {percent(evaluation.majority_accuracy)}"
     latency = evaluation.change_latency_frames
     numbers = [
-        f"{evaluation.frames} frames judged",
+        f"{counted(evaluation.frames, 'frame')} judged",
         *([f"{evaluation.unlabelled} without a label left out"] if evaluation.unlabelled else []),
         f"balanced accuracy {percent(evaluation.balanced_accuracy)}",
-        *([] if latency is None else [f"new place noticed after {latency:g} frames (median)"]),
+        *([] if latency is None else [f"new place noticed after {counted(latency, 'frame')} (median)"]),
         f"ECE {evaluation.ece:.3f}",
         f"log loss {evaluation.log_loss:.3f}",
     ]

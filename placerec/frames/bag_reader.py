@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from placerec.errors import PlacerecError, SourceError, check_optional
+from placerec.errors import PlacerecError, SourceError, check_optional, counted
 from placerec.frames.ros_image import COMPRESSED, RAW
 
 _REMEDIES = {
@@ -225,7 +225,9 @@ def stored_messages(reader: Any, path: Path, topic: str, when: int | None = None
         except StopIteration:
             return
         except Exception as error:  # Of what a damaged file makes the parser raise there is no list.
-            log.warning("%s: is damaged behind %d images (%s); the rest is not read", path, count, reason_of(error))
+            log.warning(
+                "%s: is damaged behind %s (%s); the rest is not read", path, counted(count, "image"), reason_of(error)
+            )
             return
         yield codecs[connection.msgtype], when, data
         count += 1

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from placerec.errors import SourceError
+from placerec.errors import SourceError, counted
 from placerec.frames.bag import is_bag
 from placerec.frames.camera import find_camera
 from placerec.frames.folder import (
@@ -210,6 +210,8 @@ def _in_source(source: Path, options: SourceOptions) -> list[_Found]:
     found = _without_aliases(found)
     if not found:
         wanted = f"{COLD_CAMERA}/, {WANTED}, {RECORDED}"
+        if next(source.glob("*.tsv"), None):
+            raise SourceError(f"{source}: holds no images, but .tsv files; train-lm and decode take token streams")
         raise SourceError(f"{source}: no sequence there; looked for {wanted}, {MAX_DEPTH} folders deep")
     if options.format == "auto" and _looks_like_places(roots, found):
         names = list(dict.fromkeys(item.folder.name for item in found))
@@ -263,7 +265,7 @@ def _below(
         )
     if below and itself:
         # Maps and previews lie beside sequences more often than sequences hold folders of images.
-        log.warning("%s: holds sequences; %d images beside them not read", folder, len(listing.images))
+        log.warning("%s: holds sequences; %s beside them not read", folder, counted(len(listing.images), "image"))
     return below or itself
 
 

@@ -13,7 +13,7 @@ from typing import overload
 import numpy as np
 
 from placerec.arrays import Floats
-from placerec.errors import SourceError
+from placerec.errors import SourceError, counted
 from placerec.frames import bag, video
 from placerec.frames.layouts import room_in, seconds_in
 from placerec.frames.places import PlaceList
@@ -125,11 +125,11 @@ def list_folder(folder: Path) -> Listing:
         raise SourceError(f"{folder}: cannot be read: {error.strerror}") from error
     said = []
     if unread:
-        counted = ", ".join(f"{count} *{suffix}" for suffix, count in sorted(unread.items()))
-        said.append(f"{counted}; convert them to JPEG or PNG")
+        suffixes = ", ".join(f"{count} *{suffix}" for suffix, count in sorted(unread.items()))
+        said.append(f"{suffixes}; convert them to JPEG or PNG")
     if nameless:
         first = min(map(os.fsencode, nameless))
-        said.append(f"{len(nameless)} images whose names are no text, as {first!r}; rename them")
+        said.append(f"{counted(len(nameless), 'image')} whose names are no text, as {first!r}; rename them")
     ordered = tuple(sorted(folders, key=natural_key))
     return Listing(tuple(images), tuple(recordings), ordered, tuple(sorted(labels)), ", and ".join(said))
 
@@ -212,7 +212,9 @@ def _times(folder: Path, images: Sequence[str]) -> Floats:
     if timeless.any() and not timeless.all():
         first = folder / min((images[row] for row in np.flatnonzero(timeless).tolist()), key=natural_key)
         stamped = len(images) - int(timeless.sum())
-        raise SourceError(f"{first}: no time stamp in its name, and {stamped} images there have one; remove it")
+        raise SourceError(
+            f"{first}: no time stamp in its name, and {counted(stamped, 'image')} there have one; remove it"
+        )
     return times
 
 

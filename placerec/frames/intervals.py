@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from placerec.errors import SourceError, at
+from placerec.errors import SourceError, at, counted
 from placerec.files import number_in, read_lines
 from placerec.frames.places import checked_place
 from placerec.frames.sequence import EPOCH
@@ -63,7 +63,7 @@ class Intervals:
             what = "counted from the first frame" if from_start else f"the frames', of which the first is {times[0]:g}"
             log.log(level, "%s: its seconds are %s%s", self.path, what, remedy)
         if not any(found):
-            log.warning("%s: labels none of the %d frames", self.path, len(times))
+            log.warning("%s: labels none of the %s", self.path, counted(len(times), "frame"))
         return found
 
     def _at(self, times: Sequence[float], zero: float) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Mask
-from placerec.errors import SourceError
+from placerec.errors import SourceError, counted
 from placerec.frames.sequence import Frame
 
 RowIndex = Ints | Mask | Sequence[int] | slice
@@ -196,8 +196,9 @@ class FrameTable:
         )
 
     def __repr__(self) -> str:
-        places = len({*self.places} - {""})
-        return f"FrameTable({len(self)} frames, {len({*self.sequences})} sequences, {places} places)"
+        sequences, places = len({*self.sequences}), len({*self.places} - {""})
+        of = f"{counted(sequences, 'sequence')}, {counted(places, 'place')}"
+        return f"FrameTable({counted(len(self), 'frame')}, {of})"
 
     @property
     def labelled(self) -> Mask:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from placerec.arrays import Floats
-from placerec.errors import SourceError, at
+from placerec.errors import SourceError, at, counted
 from placerec.files import read_lines
 from placerec.frames.intervals import checked_seconds
 from placerec.frames.layouts import find_camera_root, seconds_in
@@ -76,14 +76,16 @@ def read_times(path: Path, images: Sequence[str]) -> Floats:
     if named:
         missing = [image for image in images if image not in named]
         if missing:
-            raise SourceError(f"{path}: gives {len(missing)} images no time (first: {missing[0]}); add them")
+            raise SourceError(f"{path}: gives {counted(len(missing), 'image')} no time (first: {missing[0]}); add them")
         return np.array([named[image] for image in images], np.float64)
     numbers = list(range(len(images)))
     if len(listed) != len(images):
         # Some were taken out: their numbers count from 0.
         numbers = [int(match[2]) if (match := _NUMBER.fullmatch(image)) else len(listed) for image in images]
         if max(numbers, default=0) >= len(listed):
-            raise SourceError(f"{path}: has {len(listed)} times for {len(images)} images; mend it, or remove it")
+            raise SourceError(
+                f"{path}: has {counted(len(listed), 'time')} for {counted(len(images), 'image')}; mend it, or remove it"
+            )
     return np.array(listed, np.float64)[numbers]
 
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Mask
-from placerec.errors import EvaluationError, OutputError, at
+from placerec.errors import EvaluationError, OutputError, at, counted
 from placerec.files import number_in, read_text, split_lines, write_text
 from placerec.words import WordStream
 from placerec.words.stream import format_seconds
@@ -70,7 +70,7 @@ class Beliefs:
         return len(self.stream)
 
     def __repr__(self) -> str:
-        return f"Beliefs({self.name!r}: {len(self)} frames, {list_places(self.places)})"
+        return f"Beliefs({self.name!r}: {counted(len(self), 'frame')}, {list_places(self.places)})"
 
     @property
     def name(self) -> str:
@@ -101,7 +101,7 @@ class Beliefs:
 def list_places(places: Sequence[str]) -> str:
     """How many places there are, and the first of them: for the `repr` of what is about places."""
     names = ", ".join(places)
-    return f"{len(places)} places: {names if len(names) <= 60 else names[:57] + '...'}"
+    return f"{counted(len(places), 'place')}: {names if len(names) <= 60 else names[:57] + '...'}"
 
 
 class BeliefRow(NamedTuple):

@@ -75,4 +75,4 @@ def fit_calibration(belief: Floats, truth: Ints) -> Calibration:
     # Six digits: a file to read, and the last bits of a sum differ from machine to machine.
     temperature = float(f"{1 / math.sqrt(low * high):.6g}")
     losses = [float(-np.log(normalised(x * log_belief)[rows, truth]).mean()) for x in (1.0, 1 / temperature)]
-    return Calibration(temperature, len(truth), *(float(f"{loss:.6g}") for loss in losses))
+    return Calibration(temperature, len(truth), *(max(0.0, float(f"{loss:.6g}")) for loss in losses))

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from placerec.arrays import Floats, Ints
-from placerec.errors import ModelError, at
+from placerec.errors import ModelError, at, counted
 from placerec.files import all_lines, number_in
 
 PER = ("update", "frame", "second")
@@ -50,7 +50,7 @@ class Transition:
             )
 
     def __repr__(self) -> str:
-        return f"Transition({len(self.matrix)} places, per {self.per})"
+        return f"Transition({counted(len(self.matrix), 'place')}, per {self.per})"
 
     def over(self, steps: float) -> Floats:
         """The matrix (C, C) of `steps` steps >= 0: the power of `matrix`; whole numbers only without `change`."""

@@ -73,7 +73,7 @@ def choose_weights(sequences: Iterable[HeldOut], dictionaries: int) -> Weights:
     memory, alpha = np.unravel_index(int(total.argmin()), total.shape)
     unweighted = total[MEMORIES.index(0.0), ALPHAS.index(1.0)]
     # Six digits: a file to read, and the last bits of a sum differ from machine to machine.
-    told = [float(f"{loss / frames:.6g}") for loss in (total.min(), unweighted)]
+    told = [max(0.0, float(f"{loss / frames:.6g}")) for loss in (total.min(), unweighted)]
     return Weights(ALPHAS[alpha], MEMORIES[memory], told[0], told[1], frames)
 
 

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Singles
+from placerec.errors import SourceError
 from placerec.evaluation.summary import percent, shorten
 from placerec.figures.canvas import MARGIN, figure_file, panel, picture_file, place_title, write_line
 from placerec.frames import Sequence, SourceOptions, read_gray
+from placerec.frames.folder import is_image
 from placerec.frames.sequence import Gray
 from placerec.inspection.words import WordTable, look_up, typical_images
 from placerec.jobs import Progress
@@ -92,6 +94,8 @@ def show_frame(
         view = view_frame(image, dictionary)
         sequences: list[Sequence] = []
         if sources := list(sources):
+            if second := next((path for path in map(Path, sources) if is_image(path)), None):
+                raise SourceError(f"{second}: is a second image; show one at a time (SOURCE is a folder of frames)")
             table, sequences = look_up(sources, dictionary, source_options, progress, cache=cache)
             view = replace(view, table=table)
         if picture is not None:

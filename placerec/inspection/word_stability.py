@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask, Singles
-from placerec.errors import SourceError, VisionError
+from placerec.errors import SourceError, VisionError, counted
 from placerec.evaluation.summary import percent
 from placerec.figures.canvas import figure_file, picture_file
 from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at, read_gray
@@ -170,7 +170,7 @@ def word_changes(
             progress(sum(map(len, words)), len(wanted))
     judged = _Judged(np.concatenate(words), wanted, drawn, starts)
     if not len(judged.rows):
-        raise VisionError(f"none of the {total} images can be read; name a folder with images")
+        raise VisionError(f"none of the {counted(total, 'image')} can be read; name a folder with images")
     return judged.result(dictionary.training.size)
 
 
@@ -343,7 +343,7 @@ CHANGES = (
 def format_stability(found: Stability) -> str:
     """A line per change: the share of frames whose word changes, its interval, and the share that stays next to it."""
     drawn = found.frames < found.of
-    head = f"Of {found.frames} frames" + (f", drawn from {found.of}" if drawn else "")
+    head = f"Of {counted(found.frames, 'frame')}" + (f", drawn from {found.of}" if drawn else "")
     lines = [
         head,
         f"{'':<32}{'other word':>11}{'95 % interval' * drawn:>{17 * drawn}}{'a neighbour':>13}{'farther':>9}",
@@ -383,5 +383,7 @@ def plot_stability(found: Stability, path: Path | str) -> None:
         axes.spines[["top", "right", "left"]].set_visible(False)
         axes.set_xlabel("frames whose word changes, %", fontsize=8.5)
         drawn = f" (drawn from {found.of})" if found.frames < found.of else ""
-        figure.text(0.02, 1 - 0.4 / height, f"How stable the words of {found.frames} frames{drawn} are", fontsize=14)
+        figure.text(
+            0.02, 1 - 0.4 / height, f"How stable the words of {counted(found.frames, 'frame')}{drawn} are", fontsize=14
+        )
         figure.legend(loc="upper left", bbox_to_anchor=(0.01, 1 - 0.5 / height), ncols=2, frameon=False, fontsize=8.5)

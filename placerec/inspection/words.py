@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
-from placerec.errors import SourceError
+from placerec.errors import SourceError, counted
 from placerec.evaluation.summary import percent, shorten
 from placerec.frames import Sequence, SourceOptions, find_sequences, images_at
 from placerec.frames.sequence import Gray, gray_levels
@@ -195,14 +195,14 @@ def word_sentences(table: WordTable) -> list[str]:
     which = "all" if live == len(table.words) else str(live)
     told = [
         f"{len(table.words)} units, {which} of them hit in training; {seen} are words of "
-        f"{_some(frames, 'frame')} in {_some(sequences, 'sequence')}."
+        f"{counted(frames, 'frame')} in {counted(sequences, 'sequence')}."
     ]
     if live < len(table.words):
         told.append(_dead_sentence(table))
     labelled = int(table.votes.sum())
     if labelled:
         told.append(
-            f"{percent(table.agreeing / labelled)} of the {_some(labelled, 'labelled frame')} have the place that "
+            f"{percent(table.agreeing / labelled)} of the {counted(labelled, 'labelled frame')} have the place that "
             "their word mostly belongs to (counted on these very frames)."
         )
     else:
@@ -226,14 +226,10 @@ def format_words(table: WordTable) -> str:
 
 def _dead_sentence(table: WordTable) -> str:
     dead = int((table.hits == 0).sum())
-    what = f"{_some(dead, 'unit')} that no training frame hit"
+    what = f"{counted(dead, 'unit')} that no training frame hit"
     if not table.to_dead:
         return f"{what}: none of these frames is nearest to one{', for they trained the map' * table.is_training}."
     reach = f"{percent(table.to_dead / len(table.looked_at))} of the frames"
     if table.units == "live":
         return f"{what}: {reach} are nearest to one, and get the word of the nearest live unit instead."
     return f"{what}: {reach} are nearest to one and have it as word, which no language model has seen."
-
-
-def _some(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from placerec.errors import ModelError, OutputError, StreamError, at
+from placerec.errors import ModelError, OutputError, StreamError, at, counted
 from placerec.files import number_in, whole_folder, write_text
 from placerec.frames import SourceOptions
 from placerec.frames.doubts import warn_of_strange_labels, warn_of_training
@@ -88,7 +88,8 @@ def decode(
                 decisions = (json.dumps(one, ensure_ascii=False) + "\n" for one in decoder.explain_stream(stream))
                 write_text(folder / f"{stream.name}{EXPLAINED}", "".join(decisions))
             found.append(beliefs)
-    log.info("%s: %d sequences, %d frames", out, len(found), sum(len(beliefs) for beliefs in found))
+    frames = counted(sum(map(len, found)), "frame")
+    log.info("%s: %s, %s", out, counted(len(found), "sequence"), frames)
     return found
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from placerec.arrays import Floats, Ints
-from placerec.errors import ModelError
+from placerec.errors import ModelError, counted
 from placerec.files import held_folder
 from placerec.hohmm import Beliefs
 from placerec.hohmm.calibration import Calibration, fit_calibration
@@ -68,8 +68,10 @@ def _judged(models: PlaceModels, decoded: Sequence[Beliefs]) -> tuple[Floats, In
     truth = _columns(models, labels)
     usable = truth >= 0
     unlabelled, strange = labels.count(""), int((~usable).sum()) - labels.count("")
-    if unlabelled or strange:
-        log.info("left out: %d frames without a label, %d of places that the model does not know", unlabelled, strange)
+    left_out = [f"{counted(unlabelled, 'frame')} without a label"] if unlabelled else []
+    left_out += [f"{counted(strange, 'frame')} of places that the model does not know"] if strange else []
+    if left_out:
+        log.info("left out: %s", ", ".join(left_out))
     if not usable.any():
         names = ", ".join(beliefs.name for beliefs in decoded[:3]) + (", ..." if len(decoded) > 3 else "")
         raise ModelError(

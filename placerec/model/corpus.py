@@ -6,6 +6,7 @@ from itertools import islice
 from pathlib import Path
 
 from placerec.errors import StreamError
+from placerec.frames.find import MAX_DEPTH
 from placerec.frames.folder import holds_images
 from placerec.frames.places import check_place, check_twins
 from placerec.model.folder import MODEL_JSON, TOKENS
@@ -134,8 +135,8 @@ def _gather_sentences(
         remedy = f"name {made}/" if made.is_dir() else "name the tokens/ that `placerec tokenize` makes of images"
         raise StreamError(f"{folder}: is a model of train-lm, and no token streams; {remedy}")
     files = sorted((p for p in folder.iterdir() if p.suffix == ".txt" and p.name != VOCABULARY), key=lambda p: p.stem)
-    # Many who record images lay a times.txt beside them.
-    if not files or (vocabulary is None and not (folder / VOCABULARY).exists() and holds_images(folder, 1)):
+    # Many who record images lay a times.txt or a README.txt beside them.
+    if not files or (vocabulary is None and not (folder / VOCABULARY).exists() and holds_images(folder, MAX_DEPTH)):
         raise no_streams(folder, "holds neither token streams (.tsv) nor sentences (PLACE.txt)")
     words = read_vocabulary(vocabulary or find_vocabulary([folder, folder.resolve().parent]))
     check_twins((path.stem, str(path)) for path in files)

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from placerec.arrays import Floats
-from placerec.errors import ModelError, PlacerecError
+from placerec.errors import ModelError, PlacerecError, counted
 from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
 from placerec.hohmm import Calibration
@@ -136,8 +136,8 @@ class LearnedEvidence:
         if weights.log_loss is None:
             return f"{chosen}: not tried, for that takes several labelled sequences"
         return (
-            f"{chosen}: log loss {weights.log_loss:.3f} instead of {weights.unweighted:.3f} on {weights.frames} frames "
-            f"of {self.sequences} sequences, each group of them judged by the others"
+            f"{chosen}: log loss {weights.log_loss:.3f} instead of {weights.unweighted:.3f} on "
+            f"{counted(weights.frames, 'frame')} of {self.sequences} sequences, each group of them judged by the others"
         )
 
     @property
@@ -227,7 +227,9 @@ class ModelDescription:
     def read(cls, path: Path) -> "ModelDescription":
         """Read model.json; ModelError unless places, selection and dictionary are there and usable."""
         if not path.exists():
-            raise ModelError(f"{path}: missing, so {path.parent} is no model of train-lm; {_RETRAIN}")
+            raise ModelError(
+                f"{path}: missing, so {path.parent} is no model of train-lm or learn; name the folder of one"
+            )
         try:
             values = json.loads(read_text(path, ModelError))
         except ValueError as error:

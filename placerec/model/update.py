@@ -14,6 +14,8 @@ from pathlib import Path
 
 from placerec.errors import LanguageModelError, ModelError, StreamError
 from placerec.files import held_folder, read_text, restore_folder, whole_folder, write_text
+from placerec.frames.find import MAX_DEPTH
+from placerec.frames.folder import holds_images
 from placerec.frames.naming import with_parent
 from placerec.frames.places import check_twins
 from placerec.jobs import Progress
@@ -26,7 +28,7 @@ from placerec.model.options import ModelOptions
 from placerec.model.record import Record, add_record, take_away
 from placerec.model.train import write_model
 from placerec.words import format_sentences, read_vocabulary
-from placerec.words.folder import check_dictionary, stream_files
+from placerec.words.folder import check_dictionary, no_streams, stream_files
 from placerec.words.stream import FIRST, stream_name
 
 # The sentences of a place, as in its file.
@@ -153,6 +155,8 @@ def _read_visits(tokens: Sequence[Path | str], old: _Model) -> Corpus:
     """The labelled visits in `tokens`, if they are in the model's words and of the kind that it was trained on."""
     streams = old.record.transitions is not None
     if streams == holds_sentences(tokens):
+        if streams and holds_images(Path(tokens[0]), MAX_DEPTH):
+            raise no_streams(Path(tokens[0]), "holds no token stream (.tsv)")
         kind = "token streams" if streams else "a folder of sentences"
         raise StreamError(f"{tokens[0]}: is not what {old.folder} was trained on; give {kind}")
     if streams:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from placerec.arrays import Floats, Singles
-from placerec.errors import VisionError
+from placerec.errors import VisionError, counted
 from placerec.frames import Sequence
 from placerec.frames.table import FrameTable, RowIndex
 from placerec.jobs import Executor, Progress
@@ -39,7 +39,8 @@ class Descriptors:
 
     def __repr__(self) -> str:
         n, d = self.values.shape
-        return f"Descriptors({n} frames, {d} values of {self.spec.kind}, {len({*self.table.sequences})} sequences)"
+        sequences = counted(len({*self.table.sequences}), "sequence")
+        return f"Descriptors({counted(n, 'frame')}, {counted(d, 'value')} of {self.spec.kind}, {sequences})"
 
     @cached_property
     def frames(self) -> tuple[str, ...]:
@@ -141,14 +142,17 @@ def _given(sequences: list[Sequence], spec: DescriptorSpec | None, matrix: Path)
         raise VisionError(f"{matrix}: is not wanted, for the dictionary is of {spec.kind} descriptors; leave it out")
     values, kept = read_rows(matrix, [(sequence, frame.name) for sequence, frame in named])
     if not kept:
-        raise VisionError(f"{matrix}: has a row for none of the {len(named)} frames; name the matrix of these sources")
+        raise VisionError(
+            f"{matrix}: has a row for none of the {counted(len(named), 'frame')}; name the matrix of these sources"
+        )
     if spec is not None and values.shape[1] != spec.columns:
         raise VisionError(f"{matrix}: has rows of {values.shape[1]} values, and the dictionary's have {spec.columns}")
     skipped = sorted(set(range(len(named))) - set(kept))
     for k in skipped:
         log.warning("%s: has no row for %s; the frame is skipped", matrix, named[k][1].path)
     table = FrameTable.concat(FrameTable.of_frames(sequence.name, sequence.frames) for sequence in sequences)
-    log.info("%d frames described, %d skipped; rows of %s", len(kept), len(skipped), matrix)
+    missed = f", {len(skipped)} skipped" if len(skipped) else ""
+    log.info("%s described%s; rows of %s", counted(len(kept), "frame"), missed, matrix)
     spec = spec or DescriptorSpec(kind="npy", columns=values.shape[1])
     return Descriptors(spec, values, table.take(kept), len(skipped))
 

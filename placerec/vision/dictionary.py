@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from placerec.arrays import Ints, Singles
-from placerec.errors import VisionError
+from placerec.errors import VisionError, counted
 from placerec.frames.sequence import Gray
 from placerec.jobs import Executor
 from placerec.version import __version__
@@ -86,7 +86,7 @@ class Dictionary:
 
     def __repr__(self) -> str:
         size, components = self.training.size, len(self.pca.components)
-        of = f"{components} components of {self.spec.kind} descriptors, {len(self.sequences)} sequences"
+        of = f"{components} components of {self.spec.kind} descriptors, {counted(len(self.sequences), 'sequence')}"
         return f"Dictionary({size} x {size} words, {self.dead} of them dead; {of})"
 
     @cached_property
@@ -216,7 +216,8 @@ def read_dictionaries(path: Path) -> tuple[Dictionary, ...]:
         arrays, meta = read_npz(path, tuple(_ARRAYS), _more_arrays)
         return _restored(arrays, meta)
     except VisionError as error:
-        remedy = "name another" if str(error) == "no such file" else _REMEDY
+        named = {"no such file": "name another", "it is a folder": "name the words.npz of train-words or learn"}
+        remedy = named.get(str(error), _REMEDY)
         raise VisionError(f"{path}: {error}; {remedy}") from error
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from placerec.arrays import Mask, Singles
-from placerec.errors import VisionError
+from placerec.errors import VisionError, counted
 from placerec.vision.chunks import Source, SpooledRows, Stream, chunks, first_unusable
 from placerec.vision.options import DictionaryOptions
 from placerec.vision.pca import Pca
@@ -61,7 +61,8 @@ def warn_of_few(frames: int, *sizes: int) -> None:
     """A warning for every size of map that has more units than there are frames to train it."""
     for size in sizes:
         if frames < size * size:
-            log.warning("%d frames cannot fill the %d words of a map of size %d", frames, size * size, size)
+            there = counted(frames, "frame")
+            log.warning("%s cannot fill the %d words of a map of size %d; take a smaller --size", there, size**2, size)
 
 
 def learn_map(

@@ -102,8 +102,6 @@ def fit_pca(data: Moments, components: int = 80) -> Pca:
     leading = vectors[:k]
     leading = exact.on_grid(with_signs(leading))
     explained = round(float(share[k - 1]), 9)
-    if explained < PROMISED:
-        log.warning("the %d components of the PCA keep %.1f %% of the variance", k, 100 * explained)
     needed = int((share < PROMISED).sum()) + 1
     return Pca(data.mean, leading.astype(np.float32), values[:k].astype(np.float32), explained, needed)
 

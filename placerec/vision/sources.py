@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from placerec.errors import OutputError, SourceError
+from placerec.errors import OutputError, SourceError, counted
 from placerec.files import whole_file
 from placerec.frames import Sequence, SourceOptions, files_of, find_sequences
 from placerec.jobs import Executor, Progress
@@ -148,13 +148,15 @@ def _check_unread(out: Path, sequences: Iterable[Sequence], matrix: Path | str |
 def _report(made: DictionarySet) -> None:
     first, *others = made.dictionaries
     quality = first.quality
+    of_frames = counted(quality.frames, "frame")
+    if quality.used < quality.frames:
+        of_frames = f"{quality.used} of {of_frames}"
     log.info(
-        "%d words, %d of them never seen, from %d of %d frames; %d components keep %.1f %% of the variance (%d would "
+        "%d words, %d of them never seen, from %s; %d components keep %.1f %% of the variance (%d would "
         "keep 99 %%); after %d epochs %s",
         len(first.hits),
         first.dead,
-        quality.used,
-        quality.frames,
+        of_frames,
         len(first.pca.components),
         100 * quality.explained,
         quality.needed,
@@ -169,9 +171,9 @@ def _report(made: DictionarySet) -> None:
 def _report_held_out(names: Iterable[str], qualities: Iterable[MapQuality]) -> None:
     for name, quality in zip(names, qualities, strict=True):
         log.info(
-            "held out%s: %d frames, %.1f %% of them on words that training never saw; %s",
+            "held out%s: %s, %.1f %% of them on words that training never saw; %s",
             f", {name}" if name else "",
-            quality.frames,
+            counted(quality.frames, "frame"),
             100 * quality.unseen,
             _errors(quality),
         )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from placerec.arrays import Ints, Mask, Singles
-from placerec.errors import SourceError, VisionError
+from placerec.errors import SourceError, VisionError, counted
 from placerec.files import content_digest
 from placerec.frames import Frame, Sequence as FrameSequence, read_gray
 from placerec.frames.images import Batch, batches, content_key, with_images
@@ -70,9 +70,10 @@ class FrameCounts:
         """Say what came of it; VisionError if no image could be read."""
         read = self.frames - self.skipped
         if not read:
-            raise VisionError(f"none of the {self.frames} images can be read; name a folder with images")
-        constant = f"{self.constant} of one grey level throughout"
-        log.info("%d frames described, %d skipped, %s", read, self.skipped, constant)
+            raise VisionError(f"none of the {counted(self.frames, 'image')} can be read; name a folder with images")
+        skipped = f", {self.skipped} skipped" if self.skipped else ""
+        constant = f", {self.constant} of one grey level throughout" if self.constant else ""
+        log.info("%s described%s%s", counted(read, "frame"), skipped, constant)
 
 
 def describe_batch(spec: DescriptorSpec, batch: Batch) -> BatchResult:

@@ -71,6 +71,8 @@ def stream_files(sources: Iterable[Path | str]) -> list[Path]:
             raise no_streams(source, "holds no token stream (.tsv)")
         if not is_stream(found[0]) and holds_images(source, 0):
             raise no_streams(source, "is no token stream (.tsv)")
+        if found[0].suffix == ".npz":
+            raise StreamError(f"{source}: is no token stream (.tsv); the words.npz of train-words is what -w names")
         for path in found:
             if files.setdefault(os.path.abspath(path), path) is not path:
                 raise StreamError(f"{path}: is given twice; name each sequence once")

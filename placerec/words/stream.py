@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from placerec.arrays import Floats
-from placerec.errors import StreamError, at, refuse_string
+from placerec.errors import StreamError, at, counted, refuse_string
 from placerec.files import all_lines, number_in, read_lines, write_text
 from placerec.frames.places import check_place, checked_place
 from placerec.frames.table import FrameTable
@@ -102,8 +102,9 @@ class WordStream:
         return len(self.words)
 
     def __repr__(self) -> str:
-        labels = len({*self.table.places} - {""})
-        return f"WordStream({self.name!r}: {len(self)} frames, {len({*self.words})} words, {labels} places)"
+        words, labels = len({*self.words}), len({*self.table.places} - {""})
+        of = f"{counted(words, 'word')}, {counted(labels, 'place')}"
+        return f"WordStream({self.name!r}: {counted(len(self), 'frame')}, {of})"
 
     @cached_property
     def frames(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from placerec.arrays import Ints, Singles
+from placerec.errors import counted
 from placerec.files import whole_folder
 from placerec.frames import SourceOptions
 from placerec.frames.table import FrameTable
@@ -50,7 +51,7 @@ def tokenize(
         parts = _parts(sources, dictionaries, matrix, source_options, work, journal, cache, progress)
         names, seen = fill_folder(parts, dictionaries, folder)
     listed = sum(len(dictionary.vocabulary) for dictionary in dictionaries.dictionaries)
-    log.info("%s: %d sequences, %d of %d words seen", out, len(names), len(seen), listed)
+    log.info("%s: %s, %d of %d words seen", out, counted(len(names), "sequence"), len(seen), listed)
 
 
 def streams_of(

@@ -142,6 +142,39 @@ def test_unknown_commands_and_options_are_errors_of_usage() -> None:
     misused("Missing option '-o' / '--out'", "train-lm", "tokens")
 
 
+def test_wrong_usage_is_one_line_with_a_remedy(world: Path) -> None:
+    for told, *typed in (
+        ("placerec: No such command 'foo'; see `placerec --help`", "foo"),
+        ("placerec: No such option '--foo'; see `placerec --help`", "--foo"),
+        (
+            "placerec decode: Missing argument 'TOKENS...'; "
+            "for example: placerec decode tokens/run3.tsv -m model/ -o beliefs/",
+            "decode",
+        ),
+        (
+            "placerec inspect: Missing argument 'MODEL.arpa|MODEL/|NAME.explain.jsonl'; "
+            'for example: placerec inspect model/kitchen.arpa "w07 w08"',
+            "inspect",
+        ),
+        (
+            f"placerec show-words: Invalid value for 'words.npz': File '{world}' is a directory; "
+            "for example: placerec show-words words.npz RUNS/ -o words.png",
+            *("show-words", world, "words.npz"),
+        ),
+        (
+            "placerec lab: Invalid value for '--scale': 'big' is not one of 'tiny', 'small', 'paper'; "
+            "see `placerec lab --help`",
+            *("lab", "no", "--scale", "big"),
+        ),
+        (
+            "placerec decode: Option '--model' requires an argument; see `placerec decode --help`",
+            *("decode", "tokens", "--model"),
+        ),
+    ):
+        result = placerec(*typed)
+        assert (result.exit_code, result.stdout, result.stderr) == (2, "", f"{told}\n")
+
+
 @pytest.mark.parametrize(
     ("command", "option", "value", "message"),
     [
@@ -470,8 +503,7 @@ def test_quiet_is_silent_and_other_commands_tell_what_they_did(world: Path, tmp_
 def test_there_is_no_progress_bar_without_a_terminal(world: Path, tmp_path: Path) -> None:
     result = done("tokenize", world / "runs", "-w", world / "words.npz", "-o", tmp_path / "tokens", "--no-cache")
     assert result.stderr == (
-        f"24 frames described, 0 skipped, 0 of one grey level throughout\n{tmp_path / 'tokens'}: 2 sequences, "
-        + result.stderr.rpartition("2 sequences, ")[2]
+        f"24 frames described\n{tmp_path / 'tokens'}: 2 sequences, " + result.stderr.rpartition("2 sequences, ")[2]
     )
     assert "\r" not in result.stderr
     assert "%" not in result.stderr

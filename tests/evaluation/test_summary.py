@@ -24,8 +24,8 @@ def test_the_whole_table_of_a_small_case() -> None:
         "frames             4 judged, 1 without a label left out\n"
         "accuracy           50.0 %   (majority class, always 'hall': 75.0 %)\n"
         "balanced accuracy  33.3 %   (mean recall of the places)\n"
-        "change latency     1 frames, median of 1 change of place\n"
-        "ECE                0.000   (15 bins; 0 is calibrated)\n"
+        "change latency     1 frame, median of 1 change of place\n"
+        "calibration error  0.000   (ECE: belief beside the share right, 15 bins; 0 is calibrated)\n"
         "log loss           0.693   (nats per frame; 0 is best)\n"
         "risk-coverage      0.500   (area; of the surest half 50.0 % are right)\n"
         "sequences          2: 33.3 % (day) to 100.0 % (night)\n"
@@ -74,7 +74,7 @@ def test_what_is_undefined_is_a_dash() -> None:
 def test_new_places_have_a_line_where_they_were_asked_for() -> None:
     made = beliefs_of("s", ["a"], ["a", "a", "z"], ["a", "a", "unknown"])
     text = format_evaluation(evaluate([replace(made, unknown=np.array([0.1, 0.3, 0.8]))]))
-    assert "unknown AUROC      1.000   (1 frames of places without a column, 2 of others)" in text
+    assert "unknown AUROC      1.000   (1 frame of places without a column, 2 of others)" in text
     made = beliefs_of("s", ["a"], ["a"] * 3, ["a", "a", "unknown"])
     text = format_evaluation(evaluate([replace(made, unknown=np.array([0.1, 0.3, 0.8]))]))
     assert "unknown AUROC      –   (0 frames of places without a column, 3 of others)" in text

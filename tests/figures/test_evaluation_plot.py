@@ -1,6 +1,8 @@
 """Pictures: written whole, the same bytes for the same numbers, and honest about what they leave out."""
 
 import logging
+import os
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +12,13 @@ import pytest
 from helpers.pictures import drawn_texts
 from helpers.small_world import beliefs_of
 
+import placerec
 from placerec.errors import MissingExtraError, OutputError
 from placerec.evaluation.metrics import evaluate
 from placerec.figures.canvas import figure_file, place_colours
 from placerec.figures.evaluation import chosen, confusion_panel, plot_evaluation
 from placerec.figures.strip import axis_of, belief_strip
-from placerec.hohmm.beliefs import Beliefs
+from placerec.hohmm.beliefs import Beliefs, format_beliefs
 
 matplotlib = pytest.importorskip("matplotlib")
 
@@ -200,6 +203,21 @@ def test_without_matplotlib_the_extra_is_named(tmp_path: Path, monkeypatch: pyte
         f"a picture needs the package matplotlib, which is not installed: {sys.executable} -m pip install matplotlib"
     )
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_home_that_cannot_be_written_to_is_nothing_to_complain_of(tmp_path: Path) -> None:
+    """matplotlib would, in four lines, where it is imported first: in a process of its own."""
+    pytest.importorskip("matplotlib")
+    (tmp_path / "home").touch()
+    (tmp_path / "beliefs.tsv").write_text(format_beliefs(recording("seq1")), encoding="utf-8")
+    command = [sys.executable, "-m", "placerec", "evaluate", "beliefs.tsv", "--plot", "a.png"]
+    for name in ("MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"):
+        if name in os.environ:
+            pytest.skip(f"{name} says where matplotlib writes")
+    home = {**os.environ, "HOME": str(tmp_path / "home"), "PYTHONPATH": str(Path(placerec.__file__).parents[1])}
+    done = subprocess.run(command, cwd=tmp_path, env=home, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "a.png").stat().st_size > 1000
 
 
 def test_strips_are_drawn_over_time_on_one_scale(tmp_path: Path) -> None:

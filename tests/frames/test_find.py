@@ -106,7 +106,7 @@ def test_links_are_followed_but_not_in_circles_nor_twice(tmp_path: Path) -> None
 def test_images_beside_sequences_are_left_out_and_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     make(tmp_path, "map.png", "run/std_cam/t1.000000.jpeg")
     assert [sequence.name for sequence in find_sequences([tmp_path])] == ["run"]
-    assert caplog.messages == [f"{tmp_path}: holds sequences; 1 images beside them not read"]
+    assert caplog.messages == [f"{tmp_path}: holds sequences; 1 image beside them not read"]
 
 
 def test_a_list_without_images_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -254,6 +254,10 @@ def test_sources_that_are_none(tmp_path: Path) -> None:
     assert failure(tmp_path / "run/1.JPG") == (
         f"{tmp_path / 'run/1.JPG'}: is one image; name its folder, or a list of images (`-`)"
     )
+    make(tmp_path, "tokens/run1.tsv")
+    streams = "holds no images, but .tsv files; train-lm and decode take token streams"
+    assert failure(tmp_path / "tokens") == f"{tmp_path / 'tokens'}: {streams}"
+    (tmp_path / "tokens/run1.tsv").unlink()
     text = f"is a file of no kind that is read; name a folder of {WANTED}, or {RECORDED}"
     assert failure(tmp_path / "notes/readme.txt") == f"{tmp_path / 'notes/readme.txt'}: {text}"
     assert failure(tmp_path) == f"{tmp_path / 'seq/std_cam'}: holds no image; looked for {WANTED}"

@@ -62,7 +62,7 @@ def test_times_are_written_to_the_microsecond_without_exponent(seconds: float, t
 
 def test_beliefs_are_told_in_a_line() -> None:
     beliefs = parse_beliefs(f"{HEADER}\n{ROW}\n", name="seq1", source="x")
-    assert repr(beliefs) == "Beliefs('seq1': 1 frames, 2 places: kitchen, office)"
+    assert repr(beliefs) == "Beliefs('seq1': 1 frame, 2 places: kitchen, office)"
     many = Beliefs.of(WordStream.of("seq1", ["w0"] * 99), tuple(f"place{i}" for i in range(200)), np.eye(99, 200))
     assert repr(many).startswith("Beliefs('seq1': 99 frames, 200 places: place0, place1, ")
     assert len(repr(many)) < 120

@@ -1,6 +1,7 @@
 """The temperature: found again where it is known, never a change of decision, and robust where data is poor."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -70,6 +71,12 @@ def test_beliefs_of_0_and_1_are_fitted() -> None:
     # One in five is wrong: a belief of 0.8 is right, and the smallest belief 1e-15 to the power of 0.04 is a quarter.
     assert found.temperature == pytest.approx(np.log(1e15) / np.log(4), rel=0.03)
     assert found.apply(sure)[0] == pytest.approx([0.8, 0.2], abs=0.01)
+
+
+def test_no_loss_is_below_zero() -> None:
+    """-0.0 would be printed as -0.000."""
+    found = fit_calibration(np.ones((3, 1)), np.zeros(3, np.int64))
+    assert [math.copysign(1, loss) for loss in (found.log_loss_before, found.log_loss_after)] == [1, 1]
 
 
 def test_many_places_at_a_low_temperature_stay_probabilities() -> None:

@@ -185,6 +185,16 @@ def test_the_weights_with_the_least_loss_are_chosen() -> None:
     assert found.unweighted == pytest.approx(total[0, ALPHAS.index(1.0)] / 120, rel=1e-5)
 
 
+def test_the_loss_of_one_place_is_0_and_not_minus_0() -> None:
+    """It would be printed as -0.000."""
+    stream = several_words("test", 12)
+    alone = DictionaryModels(FIRST, unite_models([FIRST_MODELS["hall"]]), frozenset(FIRST_MODELS["hall"].words))
+    (part,) = evidence_in(stream, [alone], selection=Selection(), per="frame", max_gap=None)
+    truth, steps = np.zeros(len(stream), np.int64), np.ones((1, 1), np.int64)
+    found = choose_weights([HeldOut(part, truth, steps, np.ones(1))], 1)
+    assert (str(found.log_loss), str(found.unweighted)) == ("0.0", "0.0")
+
+
 def test_without_a_frame_to_judge_alpha_is_the_share_of_a_dictionary() -> None:
     found = choose_weights([], 4)
     assert (found.alpha, found.memory, found.log_loss, found.frames) == (0.25, 0.0, None, 0)

@@ -54,6 +54,13 @@ def test_the_word_is_among_the_units_though_dead_ones_are_nearer(world: Path) ->
     assert len(lines) == 9
 
 
+def test_a_second_image_is_no_source(world: Path) -> None:
+    first, second = sorted((world / "seq/std_cam").iterdir())[:2]
+    with pytest.raises(SourceError) as caught:
+        show_frame(first, world / "words.npz", [second])
+    assert str(caught.value) == f"{second}: is a second image; show one at a time (SOURCE is a folder of frames)"
+
+
 def test_a_source_tells_places_and_typical_frames(world: Path) -> None:
     bare = show_frame(first_image(world), world / "words.npz")
     assert bare.table is None

@@ -122,7 +122,7 @@ def test_frames_without_a_known_label_are_left_out_and_counted(world: Path, capl
     with caplog.at_level(logging.INFO, "placerec"):
         found = calibrate(world / "model", [world / "run3.tsv"])
     assert found.frames == 57
-    assert "left out: 2 frames without a label, 1 of places that the model does not know" in caplog.messages
+    assert "left out: 2 frames without a label, 1 frame of places that the model does not know" in caplog.messages
 
 
 def test_no_labelled_frame_is_an_error(world: Path) -> None:

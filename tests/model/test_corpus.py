@@ -97,10 +97,11 @@ def test_missing_things_are_named(tmp_path: Path) -> None:
     refused("empty: holds neither token streams (.tsv) nor sentences (PLACE.txt)", tmp_path / "empty")
     refused("empty: holds no token stream (.tsv); `placerec tokenize` makes", tmp_path / "empty", folder)
     folder_of = "but images; `placerec tokenize {} -w words.npz -o tokens/` makes token streams of that"
-    for name in ("runs/run1/std_cam/1.jpeg", "kitti/image_0/000000.png", "phone/clip.mp4"):
+    for name in ("runs/run1/std_cam/1.jpeg", "kitti/image_0/000000.png", "phone/clip.mp4", "lab/seq1/std_cam/1.png"):
         write(tmp_path / name, "")
         top = tmp_path / name.partition("/")[0]
         write(top / "times.txt", "0.5\n") if "kitti" in name else None
+        write(top / "README.txt", "Images of a laboratory.\n") if "lab" in name else None
         said = folder_of.format(top)
         refused(f"{top}: holds neither token streams (.tsv) nor sentences (PLACE.txt), {said}", top)
         refused(f"{top}: holds no token stream (.tsv), {said}", top, folder)
@@ -109,6 +110,8 @@ def test_missing_things_are_named(tmp_path: Path) -> None:
     refused(f"{image}: is no token stream (.tsv), {said}", image, image.with_name("2.jpeg"))
     said = folder_of.format(video).replace("images", "a recording", 1)
     refused(f"{video}: is no token stream (.tsv), {said}", video)
+    words = "words.npz: is no token stream (.tsv); the words.npz of train-words is what -w names"
+    refused(words, write(tmp_path / "words.npz", "PK"))
     refused("other.txt: no such file", run, vocabulary=tmp_path / "other.txt")
     refused("holds no word; one word a line is expected", run, vocabulary=write(tmp_path / "v.txt", "\n"))
     (folder / "vocab.txt").unlink()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.small_world import PLACES, VOCABULARY, run_through, write_tokens, write_world
+from helpers.small_world import PLACES, VOCABULARY, run_through, write_images, write_tokens, write_world
 from hypothesis import assume, given, settings, strategies as st
 
 from placerec.errors import LanguageModelError, ModelError, OutputError, PlacerecError, SourceError, StreamError
@@ -349,6 +349,12 @@ def test_missing_files_and_folders_are_named(world: Path) -> None:
     assert not (world / "nowhere").exists()
     with pytest.raises(ModelError, match=r"tokens/model\.json: missing, so .*tokens is no model of train-lm"):
         update(world / "tokens", [world / "tokens/run3.tsv"])
+    write_images(world / "images")
+    for text in ("", "what lies beside images\n"):
+        (world / "images/README.txt").write_text(text)
+        makes = re.escape(f"`placerec tokenize {world / 'images'} -w words.npz -o tokens/` makes token streams of that")
+        with pytest.raises(StreamError, match=rf"images: holds no token stream \(\.tsv\), but images; {makes}"):
+            update(world / "model", [world / "images"])
     (world / "model/counts/office.counts").unlink()
     refused(world, "office.counts: missing, though model.json names visits to its place", world / "tokens/run3.tsv")
 

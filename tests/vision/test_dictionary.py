@@ -173,7 +173,7 @@ def test_what_is_large_is_told_in_a_line(dictionary: Dictionary) -> None:
     components = f"{len(dictionary.pca.components)} components of gist descriptors"
     assert repr(dictionary) == f"Dictionary({size} x {size} words, {dead} of them dead; {components}, 0 sequences)"
     frames = Descriptors(SPEC, sample(3), FrameTable.of("run", ["a", "b", "c"]))
-    assert repr(frames) == "Descriptors(3 frames, 384 values of gist, 1 sequences)"
+    assert repr(frames) == "Descriptors(3 frames, 384 values of gist, 1 sequence)"
 
 
 def test_descriptors_of_another_kind_are_refused(dictionary: Dictionary) -> None:
@@ -403,7 +403,7 @@ def test_a_zip_of_something_else_and_other_things_that_are_no_file(tmp_path: Pat
     for place, message in ((path, "the array mean is missing"), (tmp_path / "no.npz", "no such file")):
         with pytest.raises(VisionError, match=message):
             Dictionary.load(place)
-    with pytest.raises(VisionError, match="it is a folder"):
+    with pytest.raises(VisionError, match=r"it is a folder; name the words\.npz of train-words or learn$"):
         Dictionary.load(tmp_path)
     with pytest.raises(OutputError):
         dictionary.save(path / "words.npz")

@@ -77,7 +77,7 @@ def test_what_cannot_be_read_is_named_and_counted(tmp_path: Path, caplog: pytest
         assert message.startswith(f"{tmp_path / name}: {reason}; ")
         assert message.endswith("; the frame is skipped")
     assert constant == f"{tmp_path / 'constant.png'}: of one grey level throughout; its descriptor is zero"
-    assert summary == f"1 frames described, {len(UNUSABLE)} skipped, 1 of one grey level throughout"
+    assert summary == f"1 frame described, {len(UNUSABLE)} skipped, 1 of one grey level throughout"
 
 
 @pytest.mark.parametrize("fit", ["squash", "crop"])

@@ -63,7 +63,7 @@ def test_the_command_says_what_came_of_it(tmp_path: Path) -> None:
     made = Dictionary.load(out)
     assert (made.training.rule, made.training.width, made.quality.epochs) == ("online", 0.4, 4)
     assert made.spec == SPEC
-    summary = r"9 words, \d of them never seen, from 12 of 12 frames; 11 components keep 100\.0 % of the variance "
+    summary = r"9 words, \d of them never seen, from 12 frames; 11 components keep 100\.0 % of the variance "
     summary += r"\(\d+ would keep 99 %\); after 4 epochs quantisation error [\d.e-]+, topographic error 0\.\d{3}, "
     summary += r"entropy \d\.\d\d bits\n"
     assert re.search(summary, result.stderr), result.stderr
@@ -122,10 +122,10 @@ def test_the_papers_words_are_a_preset_and_what_is_given_wins(tmp_path: Path) ->
 
 def test_views_and_sizes_that_do_not_exist_are_refused(tmp_path: Path) -> None:
     for options, message in (
-        (("--views", "plain,lda"), "Invalid value for '--views': 'lda' is not one of 'plain', 'pn'."),
+        (("--views", "plain,lda"), "Invalid value for '--views': 'lda' is not one of 'plain', 'pn';"),
         (("--views", "pn,pn"), "Invalid value for '--views': pn is named twice"),
-        (("--sizes", "10,1"), "Invalid value for '--size' / '--sizes': 1 is not in the range 2<=x<=200."),
-        (("--size", "10,,20"), "Invalid value for '--size' / '--sizes': '' is not a valid integer range."),
+        (("--sizes", "10,1"), "Invalid value for '--size' / '--sizes': 1 is not in the range 2<=x<=200;"),
+        (("--size", "10,,20"), "Invalid value for '--size' / '--sizes': '' is not a valid integer range;"),
         (("--size", "010,10"), "Invalid value for '--size' / '--sizes': 10 is named twice"),
     ):
         misused(message, "train-words", tmp_path, "-o", tmp_path / "no", *options)

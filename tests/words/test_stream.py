@@ -138,7 +138,7 @@ def test_columns_of_different_lengths_are_refused() -> None:
 
 def test_a_stream_is_told_in_a_line() -> None:
     stream = WordStream.of("run", ["a", "b"] * 5000, ["hall", ""] * 5000)
-    assert repr(stream) == "WordStream('run': 10000 frames, 2 words, 1 places)"
+    assert repr(stream) == "WordStream('run': 10000 frames, 2 words, 1 place)"
 
 
 def test_a_renamed_stream_has_its_name_in_its_table() -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from placerec.errors import counted
 from placerec.evaluation.bootstrap import Pair, compare_pairs, count_blocks, draw, interval
 from placerec.evaluation.metrics import evaluate
 from placerec.experiments.comparison.benchmark import FrontEndCost, MethodRun
@@ -114,7 +115,7 @@ def format_comparison(found: Comparison) -> str:
             f"  {100 * s.accuracy_low:>6.1f} - {100 * s.accuracy_high:>4.1f} %{100 * s.balanced_accuracy:>8.1f} %"
             f"{latency:>9}{s.ece:>7.3f}{s.log_loss:>10.3f}{s.microseconds_per_frame:>10.1f}"
         )
-    lines.append(f"{found.frames} frames; always {found.majority_place!r}: {100 * found.majority:.1f} %")
+    lines.append(f"{counted(found.frames, 'frame')}; always {found.majority_place!r}: {100 * found.majority:.1f} %")
     return "\n".join(lines)
 
 
