@@ -43,7 +43,7 @@ def _overall(evaluation: Evaluation) -> list[str]:
         f"accuracy           {percent(evaluation.accuracy)}   (majority class, {majority})",
         f"balanced accuracy  {percent(evaluation.balanced_accuracy)}   (mean recall of the places)",
         f"change latency     {delay}",
-        f"calibration error  {evaluation.ece:.3f}   (ECE: belief beside the share right, {ECE_BINS} bins; 0 is calibrated)",
+        f"calibration error  {evaluation.ece:.3f}   (ECE: belief beside share right, {ECE_BINS} bins; 0 is calibrated)",
         f"log loss           {evaluation.log_loss:.3f}   (nats per frame; 0 is best)",
         f"risk-coverage      {evaluation.risk_coverage.area:.3f}   (area; of the surest half {half} are right)",
     ]

@@ -25,7 +25,7 @@ def test_the_whole_table_of_a_small_case() -> None:
         "accuracy           50.0 %   (majority class, always 'hall': 75.0 %)\n"
         "balanced accuracy  33.3 %   (mean recall of the places)\n"
         "change latency     1 frame, median of 1 change of place\n"
-        "calibration error  0.000   (ECE: belief beside the share right, 15 bins; 0 is calibrated)\n"
+        "calibration error  0.000   (ECE: belief beside share right, 15 bins; 0 is calibrated)\n"
         "log loss           0.693   (nats per frame; 0 is best)\n"
         "risk-coverage      0.500   (area; of the surest half 50.0 % are right)\n"
         "sequences          2: 33.3 % (day) to 100.0 % (night)\n"
