@@ -48,22 +48,27 @@ def fit_image(gray: Gray, size: int, fit: str = "squash") -> Gray:
         raise VisionError(f"no fit is called {fit!r}; choose one of {', '.join(FITS)}")
     if size < SMALLEST:
         raise VisionError(f"an image size of {size} is too small; at least 8 is needed")
-    height, width = gray.shape
-    if (height, width) == (size, size):
-        return gray
-    if gray.min() == gray.max():
+    if gray.shape != (size, size) and gray.min() == gray.max():
         # Interpolation in floating point would leave rounding noise, which LMgist's stretch blows up to a texture.
         return cast(Gray, np.full((size, size), gray[0, 0]))
+    return cast(Gray, fit_pixels(gray, size, size, fit))
+
+
+def fit_pixels(pixels: NDArray[Any], height: int, width: int, fit: str) -> NDArray[Any]:
+    """Pixels (h, w) or (h, w, channels) as `fit_image` resizes them, to (height, width)."""
+    high, wide = pixels.shape[:2]
+    if (high, wide) == (height, width):
+        return pixels
     if fit == "squash":
-        return _resize(gray, size, size)
-    scale = max(size / height, size / width)
-    height, width = int(scale * height + 0.5), int(scale * width + 0.5)
-    top, left = (height - size) // 2, (width - size) // 2
-    return _resize(gray, height, width)[top : top + size, left : left + size]
+        return _resize(pixels, height, width)
+    scale = max(height / high, width / wide)
+    high, wide = int(scale * high + 0.5), int(scale * wide + 0.5)
+    top, left = (high - height) // 2, (wide - width) // 2
+    return _resize(pixels, high, wide)[top : top + height, left : left + width]
 
 
-def _resize(gray: Gray, height: int, width: int) -> Gray:
+def _resize(pixels: NDArray[Any], height: int, width: int) -> NDArray[Any]:
     # One axis may shrink while the other grows, and INTER_AREA averages only if both shrink: hence two steps.
-    small = (min(width, gray.shape[1]), min(height, gray.shape[0]))
-    shrunk = cv2.resize(gray, small, interpolation=cv2.INTER_AREA)
-    return cast(Gray, cv2.resize(shrunk, (width, height), interpolation=cv2.INTER_LINEAR))
+    small = (min(width, pixels.shape[1]), min(height, pixels.shape[0]))
+    shrunk = cv2.resize(pixels, small, interpolation=cv2.INTER_AREA)
+    return cv2.resize(shrunk, (width, height), interpolation=cv2.INTER_LINEAR)
