@@ -27,6 +27,7 @@ _ROOMS = {
     "placerec.lm.adapt": ("adapt_lm",),
     "placerec.lm.check": ("check_model",),
     "placerec.lm.inspect": ("inspect_model",),
+    "placerec.lm.text": ("train_ngrams",),
     "placerec.hohmm": (
         "Belief",
         "Beliefs",
@@ -82,6 +83,7 @@ if TYPE_CHECKING:
     from placerec.lm.adapt import adapt_lm
     from placerec.lm.check import check_model
     from placerec.lm.inspect import inspect_model
+    from placerec.lm.text import train_ngrams
     from placerec.methods import decode, follow_live, load_decoder
     from placerec.model import Decoding, ModelOptions, calibrate, load_recognizer, train_lm, update
     from placerec.page.report import report
@@ -156,6 +158,7 @@ __all__ = [
     "tokenize",
     "train_dictionary",
     "train_lm",
+    "train_ngrams",
     "update",
     "write_arpa",
     "write_stream",

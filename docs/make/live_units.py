@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from single_frame import SEEDS, SIZE, answering, answers, arguments, described, fitted, folds, majority, spread
 
+from placerec.vision.options import Units
+
 HEAD = """\
 | set | test frames | majority class | all units | live units | gain | dead units | test frames on them |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -19,7 +21,8 @@ def row(folder: Path, test: list[str]) -> str:
     """A set's line: means over five maps, and how many test frames are nearest to a dead unit."""
     frames = described(folder)
     tests = folds(frames, test)
-    right = {units: [list[np.bool_]() for _ in SEEDS] for units in ("all", "live")}
+    of: tuple[Units, ...] = ("all", "live")
+    right = {units: [list[np.bool_]() for _ in SEEDS] for units in of}
     dead, on_dead = [], 0
     for mask in tests:
         for seed, dictionary in enumerate(fitted(frames, mask)):
@@ -29,7 +32,7 @@ def row(folder: Path, test: list[str]) -> str:
             nearest, _ = answering(dictionary, "all").words(frames.values[mask])
             on_dead += int((dictionary.hits[nearest] == 0).sum())
     share, asked = majority(frames, tests)
-    every, live = ([float(np.mean(one)) for one in right[units]] for units in ("all", "live"))
+    every, live = ([float(np.mean(one)) for one in right[units]] for units in of)
     on_dead_share = on_dead / len(SEEDS) / sum(int(mask.sum()) for mask in tests)
     return (
         f"| {folder.name} | {asked} | {share:.3f} | {spread(every)} | {spread(live)} "

@@ -49,7 +49,7 @@ def transition(name: str, training: Sequence[WordStream], places: Sequence[str])
     """The transitions that decode has under this name."""
     if name == "learned":
         return learned_transition(np.sum([place_steps(stream, places) for stream in training], axis=0))
-    return fixed_transition(len(places), per=name.split()[-1])
+    return fixed_transition(len(places), per="frame" if name == "fixed per frame" else "update")
 
 
 def decoded(training: Sequence[WordStream], tests: Sequence[WordStream], vocabulary: Sequence[str]) -> Found:

@@ -16,6 +16,7 @@ import numpy as np
 from placerec import DescriptorSpec, Dictionary, describe, find_sequences
 from placerec.arrays import Mask
 from placerec.vision import Descriptors, DictionaryOptions
+from placerec.vision.options import Units
 
 SIZE = 20
 SEEDS = range(5)
@@ -59,7 +60,7 @@ def fitted(frames: Descriptors, tests: Mask) -> Iterator[Dictionary]:
         yield Dictionary.fit(frames.values[~tests], spec=frames.spec, options=DictionaryOptions(size=SIZE, seed=seed))
 
 
-def answering(dictionary: Dictionary, units: str) -> Dictionary:
+def answering(dictionary: Dictionary, units: Units) -> Dictionary:
     """The same map, answering with `live` or `all` units."""
     return replace(dictionary, training=replace(dictionary.training, units=units))
 

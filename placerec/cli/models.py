@@ -14,6 +14,7 @@ from placerec.errors import counted
 
 if TYPE_CHECKING:
     from placerec.model import Decoding, ModelOptions
+    from placerec.model.decoding import ScorerName
 
 # The names of placerec.methods.METHODS, written out: --help would wait for numpy.
 METHODS = (
@@ -273,7 +274,9 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, cache: 
         _decode_whole(tokens, out, cache=cache, **how)
 
 
-def _answer_lines(*, model: Path, method: str, options: "Decoding", scorer: str, as_json: bool, **_: Any) -> None:
+def _answer_lines(
+    *, model: Path, method: str, options: "Decoding", scorer: "ScorerName", as_json: bool, **_: Any
+) -> None:
     """An answer for each line of standard input, as it is read."""
     from placerec.methods import decode_lines, load_decoder
 

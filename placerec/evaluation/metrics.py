@@ -63,10 +63,21 @@ class Evaluation:
     new_places: NewPlaces | None  # None where no sequence has the column `unknown`
     sequences: dict[str, SequenceScore]
 
+    def _repr_html_(self) -> str:
+        from placerec.evaluation.html import evaluation_html
+
+        return evaluation_html(self)
+
     @property
     def ece(self) -> float:
         """The expected calibration error."""
         return self.reliability.error
+
+    def to_dict(self) -> dict[str, list[object]]:
+        """A table with a row for each place: `pandas.DataFrame(evaluation.to_dict())`, and so for polars."""
+        scores = self.per_place.values()
+        numbers = {name: [getattr(one, name) for one in scores] for name in ("frames", "precision", "recall")}
+        return {"place": [*self.per_place], **numbers}
 
     def to_json(self) -> dict[str, object]:
         """The object that `evaluate --json` prints: plain Python values, None where a number is undefined."""

@@ -72,6 +72,11 @@ class Beliefs:
     def __repr__(self) -> str:
         return f"Beliefs({self.name!r}: {counted(len(self), 'frame')}, {list_places(self.places)})"
 
+    def _repr_html_(self) -> str:
+        from placerec.hohmm.beliefs_html import beliefs_html
+
+        return beliefs_html(self)
+
     @property
     def name(self) -> str:
         """The sequence."""
@@ -96,6 +101,13 @@ class Beliefs:
     def words(self) -> tuple[str, ...]:
         """The word of each frame."""
         return self.stream.words
+
+    def to_dict(self) -> dict[str, Sequence[str] | Floats | Mask]:
+        """The columns of the beliefs' file: `pandas.DataFrame(beliefs.to_dict())`, and so for polars."""
+        own = (self.frames, self.times, self.truth, self.words, self.selected, self.best)
+        columns: dict[str, Sequence[str] | Floats | Mask] = dict(zip(COLUMNS, own, strict=True))
+        columns |= dict(zip(self.places, self.belief.T, strict=True))
+        return columns if self.unknown is None else columns | {UNKNOWN_PLACE: self.unknown}
 
 
 def list_places(places: Sequence[str]) -> str:

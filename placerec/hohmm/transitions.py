@@ -13,6 +13,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from placerec.arrays import Floats, Ints
 from placerec.errors import ModelError, at, counted
 from placerec.files import all_lines, number_in
 
-PER = ("update", "frame", "second")
+Per = Literal["update", "frame", "second"]
+PER: tuple[str, ...] = get_args(Per)
 # Numbers written with three digits may miss 1 by as much; more is a mistake.
 _SUM_TOLERANCE = 1e-3
 
@@ -36,7 +38,7 @@ class Transition:
     """
 
     matrix: Floats
-    per: str = "update"
+    per: Per = "update"
     change: float | None = None
     _powers: dict[int, Floats] = field(default_factory=dict, init=False, repr=False)
 
@@ -83,7 +85,7 @@ def fade(change: float, steps: Floats) -> tuple[Floats, Floats]:
     return np.exp(exponent), -np.expm1(exponent)
 
 
-def fixed_transition(places: int, stay: float = 0.99, per: str = "update") -> Transition:
+def fixed_transition(places: int, stay: float = 0.99, per: Per = "update") -> Transition:
     """The paper's transitions: `stay` on the diagonal, the rest shared equally (p_e of section 3; readings A24).
 
     Raises ModelError if `stay` is no probability, or is below 1 / places and steps are seconds.

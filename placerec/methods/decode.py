@@ -14,9 +14,9 @@ from placerec.hohmm import Belief, Recognizer, SequenceDecoder
 from placerec.hohmm.beliefs import BeliefRow, Beliefs, format_beliefs, format_header, format_json_row, format_row
 from placerec.hohmm.explain import EXPLAINED
 from placerec.jobs import Progress
-from placerec.methods.decoders import HOHMM, make_decoder
+from placerec.methods.decoders import HOHMM, check_method, make_decoder
 from placerec.model import Decoding, PlaceModels, load_model
-from placerec.model.decoding import AS_LEARNED, token_streams
+from placerec.model.decoding import AS_LEARNED, ScorerName, token_streams
 from placerec.words import WordStream
 from placerec.words.folder import dictionary_of, is_stream, stream_files
 
@@ -33,7 +33,7 @@ def decode(
     out: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     options: Decoding = AS_LEARNED,
-    scorer: str = "native",
+    scorer: ScorerName = "native",
     as_json: bool = False,
     cache: Path | str | None = None,
     progress: Progress | None = None,
@@ -46,6 +46,8 @@ def decode(
     trained words or models are named in a warning, and so are labels that the models do not know. Raises ModelError or
     StreamError for what cannot be read or does not belong together.
     """
+
+    check_method(method, options, scorer=scorer)
 
     def opened() -> tuple[SequenceDecoder, list[WordStream]]:
         models = load_model(model)

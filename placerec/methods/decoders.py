@@ -25,7 +25,7 @@ from placerec.methods import (
 )
 from placerec.methods.training_set import MakeStepper, TrainingSet, read_training_set
 from placerec.model import Decoding, PlaceModels, load_model, make_recognizer
-from placerec.model.decoding import AS_LEARNED, PAPER, as_in_paper, check_online, check_words
+from placerec.model.decoding import AS_LEARNED, PAPER, ScorerName, as_in_paper, check_online, check_scorer, check_words
 from placerec.words import Selection
 from placerec.words.stream import FIRST
 
@@ -104,8 +104,9 @@ class StepDecoder(SequenceDecoder):
         return posterior(np.full(columns, 1 / columns)), take_in
 
 
-def check_method(name: str, options: Decoding = AS_LEARNED, *, scorer: str = "native") -> None:
-    """Raise ModelError if there is no method of this name for words alone, or if the options say nothing to it."""
+def check_method(name: str, options: Decoding = AS_LEARNED, *, scorer: ScorerName = "native") -> None:
+    """Raise ModelError if there is no method of this name for words alone, or no scorer, or if options say nothing."""
+    check_scorer(scorer)
     if name in NEED_DESCRIPTORS:
         raise ModelError(f"{name} needs descriptors, not words alone; `placerec compare` runs it")
     if name not in METHODS:
@@ -131,7 +132,7 @@ def make_decoder(
     *,
     options: Decoding = AS_LEARNED,
     dictionary: "Dictionary | DictionarySet | None" = None,
-    scorer: str = "native",
+    scorer: ScorerName = "native",
 ) -> SequenceDecoder:
     """What decodes by the method `name`, on-line or a sequence at a time; for `hohmm` this is `make_recognizer`.
 
@@ -160,11 +161,12 @@ def make_decoder(
 
 
 def load_decoder(
-    name: str, path: Path | str, *, options: Decoding = AS_LEARNED, scorer: str = "native"
+    name: str, path: Path | str, *, options: Decoding = AS_LEARNED, scorer: ScorerName = "native"
 ) -> SequenceDecoder:
     """What decodes a MODEL/ folder by the method `name`, on-line; see `make_decoder`.
 
     Raises ModelError for options that need later words.
     """
     check_online(options)
+    check_method(name, options, scorer=scorer)
     return make_decoder(name, load_model(path), options=options, scorer=scorer)

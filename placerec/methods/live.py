@@ -22,7 +22,7 @@ from placerec.hohmm import Belief, SequenceDecoder, format_header
 from placerec.methods.decode import format_belief
 from placerec.methods.decoders import HOHMM, make_decoder
 from placerec.model import load_model
-from placerec.model.decoding import AS_LEARNED, Decoding
+from placerec.model.decoding import AS_LEARNED, Decoding, ScorerName
 from placerec.words.folder import is_stream
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def decode_live(
     method: str = HOHMM,
     source_options: SourceOptions = SourceOptions(),
     options: Decoding = AS_LEARNED,
-    scorer: str = "native",
+    scorer: ScorerName = "native",
     as_json: bool = False,
 ) -> Generator[str, None, None]:
     """`placerec decode --live`: the lines of a beliefs file, each as soon as its frame has come; TSV with a header.

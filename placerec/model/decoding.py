@@ -6,12 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from placerec.errors import ModelError
 from placerec.hohmm import Calibration, Recognizer
 from placerec.hohmm.evidence import MARKERS, Emissions, SeparateEmissions
 from placerec.hohmm.transitions import (
+    PER,
+    Per,
     Transition,
     fixed_transition,
     forgetting,
@@ -30,8 +32,11 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-STAY, PER = 0.99, "update"
-NAMED = ("fixed", "learned")
+STAY: float = 0.99
+_PER: Per = "update"
+TransitionName = Literal["fixed", "learned"]
+NAMED: tuple[str, ...] = get_args(TransitionName)
+ScorerName = Literal["native", "kenlm"]
 
 
 @dataclass(frozen=True)
@@ -51,9 +56,9 @@ class Decoding:
     what decided (`placerec.hohmm.explain`). Raises ModelError for options that exclude each other.
     """
 
-    transition: str | None = None
+    transition: TransitionName | Path | None = None
     stay: float | None = None
-    per: str | None = None
+    per: Per | None = None
     alpha: float | None = None
     memory: float | None = None
     max_gap: float | None = None
@@ -65,6 +70,8 @@ class Decoding:
     explain: bool = False
 
     def __post_init__(self) -> None:
+        if self.per not in (*PER, None):
+            raise ModelError(f"per {self.per!r} is unknown; choose one of {', '.join(PER)}")
         if self.transition == "learned" and (self.stay is not None or self.per is not None):
             raise ModelError("learned transitions are per frame: they take neither a stay probability nor `per`")
         if self.alpha is not None and not 0 < self.alpha < math.inf:
@@ -83,6 +90,8 @@ class Decoding:
                     f"{self.transition}: transitions of a file cannot be per second, since a matrix has no power for a "
                     "part of a second; choose update or frame"
                 )
+            if not Path(self.transition or "").exists():
+                raise ModelError(f"{self.transition}: no such file; transitions are fixed, learned, or a file")
         if self.max_gap is not None and not self.max_gap > 0:
             raise ModelError(f"largest gap {self.max_gap:g} s is not above 0")
         if self.lag is not None and self.lag < 0:
@@ -159,7 +168,7 @@ def transition_of(model: PlaceModels, options: Decoding) -> Transition:
 
 def _steps(model: PlaceModels, options: Decoding) -> Transition:
     """The transitions without any forgetting."""
-    per = options.per or PER
+    per = options.per or _PER
     if options.transition == "fixed":
         return fixed_transition(len(model.models), STAY if options.stay is None else options.stay, per)
     if options.transition == "learned":
@@ -170,10 +179,7 @@ def _steps(model: PlaceModels, options: Decoding) -> Transition:
                 "train it on token streams, or choose fixed transitions"
             )
         return learned_transition(counts)
-    path = Path(options.transition or "")
-    if not path.exists():
-        raise ModelError(f"{path}: no such file; transitions are fixed, learned, or a file")
-    return Transition(read_transitions(path, tuple(model.models)), per)
+    return Transition(read_transitions(Path(options.transition or ""), tuple(model.models)), per)
 
 
 def describe_decoding(model: PlaceModels, options: Decoding) -> dict[str, Any]:
@@ -202,7 +208,7 @@ def load_recognizer(
     *,
     options: Decoding = AS_LEARNED,
     dictionary: "Dictionary | DictionarySet | None" = None,
-    scorer: str = "native",
+    scorer: ScorerName = "native",
 ) -> Recognizer:
     """The recognizer of a MODEL/ folder.
 
@@ -212,6 +218,7 @@ def load_recognizer(
     recognizer's `decode`), and as `transition_of`, `calibration_of` and `unknown_model_of` do.
     """
     check_online(options)
+    check_scorer(scorer)
     return make_recognizer(load_model(path), options=options, dictionary=dictionary, scorer=scorer)
 
 
@@ -220,7 +227,7 @@ def make_recognizer(
     *,
     options: Decoding = AS_LEARNED,
     dictionary: "Dictionary | DictionarySet | None" = None,
-    scorer: str = "native",
+    scorer: ScorerName = "native",
     emissions: Emissions | None = None,
 ) -> Recognizer:
     """The recognizer of a model that is loaded; see `load_recognizer`.
@@ -228,8 +235,7 @@ def make_recognizer(
     `emissions`: in place of those of the first dictionary's models, which then stand alone.
     """
     check_words(model, dictionary)
-    if scorer not in ("native", "kenlm"):
-        raise ModelError(f"scorer {scorer!r} is unknown; choose native or kenlm")
+    check_scorer(scorer)
     every = [model] if emissions is not None else [*model.dictionaries.values()]
     return Recognizer(
         model.models,
@@ -244,6 +250,12 @@ def make_recognizer(
         unknown=unknown_models_of(model)[: len(every)] if options.unknown else None,
         explain=options.explain,
     )
+
+
+def check_scorer(scorer: str) -> None:
+    """Raise ModelError if nothing scores under this name."""
+    if scorer not in get_args(ScorerName):
+        raise ModelError(f"scorer {scorer!r} is unknown; choose {' or '.join(get_args(ScorerName))}")
 
 
 def check_words(model: PlaceModels, dictionary: "Dictionary | DictionarySet | None") -> None:

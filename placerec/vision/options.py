@@ -1,13 +1,15 @@
 """How dictionaries are learned: the options of `train-words`."""
 
 from dataclasses import asdict, dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
 from placerec.errors import VisionError
-from placerec.vision.som import RULES, WIDTH
+from placerec.vision.som import RULES, WIDTH, Rule
 
-UNITS = ("live", "all")
+Units = Literal["live", "all"]
+UNITS: tuple[str, ...] = get_args(Units)
 VIEWS = ("plain", "pn")
 
 
@@ -26,8 +28,8 @@ class DictionaryOptions:
     seed: int = 0
     fraction: float = 1.0
     epochs: int | None = None
-    units: str = "live"
-    rule: str = "batch"
+    units: Units = "live"
+    rule: Rule = "batch"
     width: float = WIDTH
 
     def __post_init__(self) -> None:
@@ -61,8 +63,8 @@ class DictionarySetOptions:
     seed: int = 0
     fraction: float = 1.0
     epochs: int | None = None
-    units: str = "live"
-    rule: str = "batch"
+    units: Units = "live"
+    rule: Rule = "batch"
     width: float = WIDTH
 
     def __post_init__(self) -> None:

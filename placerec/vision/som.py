@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ from placerec.vision.chunks import CHUNK, Source, check_again, chunks, each_chun
 
 EpochProgress = Callable[[int, int, float], None]  # epoch (from 1), epochs, quantisation error
 
-RULES = ("batch", "online")
+Rule = Literal["batch", "online"]
+RULES: tuple[str, ...] = get_args(Rule)
 EPOCHS = 50
 WIDTH = 0.5  # 1.0 and more gives worse words on small maps, and no later step uses the topology
 _RATES = (0.5, 0.01)  # the learning rate of the on-line rule, first and last
@@ -61,7 +62,7 @@ def train_som(
     size: int,
     *,
     rng: np.random.Generator,
-    rule: str = "batch",
+    rule: Rule = "batch",
     width: float = WIDTH,
     epochs: int | None = None,
     progress: EpochProgress | None = None,

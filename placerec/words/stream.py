@@ -133,6 +133,14 @@ class WordStream:
         column = self if name == FIRST else self.further[name]
         return WordStream(self.name, self.table, column.words, column.distances)
 
+    def to_dict(self) -> dict[str, Sequence[str] | Floats]:
+        """The columns of the token stream's file: `pandas.DataFrame(stream.to_dict())`, and so for polars."""
+        columns: dict[str, Sequence[str] | Floats] = {"frame": self.frames, "time": self.times, "place": self.places}
+        for name in self.dictionaries:
+            own = self.in_dictionary(name)
+            columns |= {column_of(name): own.words, f"{DISTANCE}{name}".rstrip("."): own.distances}
+        return columns
+
     def renamed(self, name: str) -> "WordStream":
         """The stream as that of a sequence that is called `name`."""
         return replace(self, name=name, table=self.table.renamed(name))

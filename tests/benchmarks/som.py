@@ -18,7 +18,7 @@ import numpy as np
 from minisom import MiniSom
 from numpy.typing import NDArray
 
-from placerec.vision.som import map_quality, train_som
+from placerec.vision.som import Rule, map_quality, train_som
 
 SIDE, COMPONENTS, SPOTS = 20, 80, 300
 EPOCHS = (2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 50)
@@ -60,7 +60,7 @@ def minisom(rows: Rows, last: float) -> Rows:
     return np.asarray(som.get_weights(), np.float32).reshape(SIDE * SIDE, -1)
 
 
-def ours(rows: Rows, epochs: int | None, last: float, rule: str = "batch") -> Rows:
+def ours(rows: Rows, epochs: int | None, last: float, rule: Rule = "batch") -> Rows:
     """Our codebook."""
     return train_som(rows, SIDE, rng=np.random.default_rng(0), rule=rule, width=last, epochs=epochs).codebook
 

@@ -84,6 +84,10 @@ def test_every_method_has_a_line_with_what_evaluate_says(done: tuple[Path, Compa
         assert float(row["accuracy_low"]) <= float(row["accuracy"]) <= float(row["accuracy_high"])
         assert float(row["microseconds_per_frame"]) > 0
         assert sorted(path.name for path in (out / "beliefs" / name).glob("*.tsv")) == ["run3.tsv", "run4.tsv"]
+    columns = found.to_dict()
+    assert columns["method"] == [*METHODS]
+    assert columns["accuracy"] == pytest.approx([float(row["accuracy"]) for row in table.values()], abs=1e-6)
+    assert set(COLUMNS.split(",")) <= set(columns)
     assert all(float(row["accuracy"]) > 0.8 for name, row in table.items() if name != "majority")
     assert float(table["majority"]["accuracy"]) == found.majority == 0.5
 

@@ -57,6 +57,19 @@ def outputs(out: Path) -> list[bytes]:
     return [(out / name).read_bytes() for name in ("results.csv", "sequences.csv")]
 
 
+def test_the_columns_of_results_are_those_of_their_file(tmp_path: Path) -> None:
+    for seed, name in enumerate("ab"):
+        write_images(tmp_path / "runs" / name, seed)
+    out = tmp_path / "out"
+    _, results = run_grid(read_config(write_grid(tmp_path, IMAGES)), out)
+    columns = results.to_dict()
+    header, *rows = [line.split(",") for line in (out / "results.csv").read_text().splitlines()]
+    assert list(columns) == header
+    assert [len(column) for column in columns.values()] == [len(rows)] * len(header)
+    assert [str(value) for value in columns["select"]] == [row[header.index("select")] for row in rows]
+    assert columns["accuracy"] == pytest.approx([float(row[header.index("accuracy")]) for row in rows], abs=1e-6)
+
+
 def test_a_second_run_does_only_what_changed(tmp_path: Path, work: Counter[str]) -> None:
     for seed, name in enumerate("ab"):
         write_images(tmp_path / "runs" / name, seed)

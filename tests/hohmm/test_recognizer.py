@@ -5,7 +5,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from placerec.hohmm import (
     fixed_transition,
     learned_transition,
 )
+from placerec.hohmm.transitions import Per
 from placerec.hohmm.unknown import UnknownModel
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
 from placerec.words import Selection, WordStream
@@ -115,7 +116,7 @@ def timed(words: list[str], times: list[float]) -> WordStream:
 def situations(draw: st.DrawFn) -> tuple[dict[str, BackoffModel], Selection, Transition, float | None, WordStream]:
     """Models, a rule, transitions of any kind and unit, perhaps a largest gap, and a stream with unlisted words."""
     models = models_of(draw(corpora), draw(st.integers(1, 3)))
-    per = draw(st.sampled_from(["update", "frame", "second"]))
+    per: Per = draw(st.sampled_from(get_args(Per)))
     if per == "second":
         transition = fixed_transition(len(models), draw(st.sampled_from([0.5, 0.99, 1.0])), per)
     else:

@@ -74,7 +74,7 @@ def test_wrong_transitions_are_refused() -> None:
     with pytest.raises(ModelError, match=r"^stay probability 1\.5 is not between 0 and 1"):
         fixed_transition(3, 1.5)
     with pytest.raises(ModelError, match="transitions per 'hour' are unknown; choose update, frame, second"):
-        fixed_transition(3, 0.9, "hour")
+        fixed_transition(3, 0.9, "hour")  # type: ignore[arg-type]
     # A place that is left more often than at random swings: there is no half of such a step.
     with pytest.raises(ModelError, match="transitions per second need parts of a step"):
         fixed_transition(3, 0.3, "second")

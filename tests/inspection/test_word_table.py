@@ -16,6 +16,7 @@ from placerec.frames import SourceOptions, find_sequences
 from placerec.frames.table import FrameTable
 from placerec.inspection.words import WordTable, format_words, typical_images, u_matrix, word_table
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions
+from placerec.vision.options import Units
 
 SPEC = DescriptorSpec(image_size=16)
 
@@ -36,12 +37,12 @@ def described(n: int = 60, seed: int = 1, places: tuple[str, ...] = ("b", "a", "
     return Descriptors(SPEC, sample(n, seed), FrameTable.concat([one, two]))
 
 
-def dictionary(units: str = "live") -> Dictionary:
+def dictionary(units: Units = "live") -> Dictionary:
     return Dictionary.fit(sample(40, 0), spec=SPEC, options=DictionaryOptions(size=7, units=units))
 
 
 @pytest.mark.parametrize("units", ["live", "all"])
-def test_the_table_is_that_of_a_plain_loop(units: str) -> None:
+def test_the_table_is_that_of_a_plain_loop(units: Units) -> None:
     frames, words = described(), dictionary(units)
     table = word_table(frames, words)
     codes = (frames.values - words.pca.mean) @ words.pca.components.T

@@ -43,7 +43,7 @@ def test_learned_transitions_are_those_of_the_training(world: Path) -> None:
     assert np.array_equal(learned.matrix, learned_transition([[36, 4, 0], [0, 36, 4], [2, 0, 36]]).matrix)
     rows = "\n".join("\t".join(repr(p) for p in row) for row in learned.matrix.tolist())
     (world / "steps.tsv").write_text("\t".join(PLACES) + "\n" + rows)
-    from_file = Decoding(transition=str(world / "steps.tsv"), per="frame")
+    from_file = Decoding(transition=world / "steps.tsv", per="frame")
     expected = belief(world, Decoding(transition="learned"))
     assert belief(world, from_file) == pytest.approx(expected, abs=1e-12)
     assert not np.allclose(belief(world, Decoding(transition=from_file.transition)), expected)
@@ -67,9 +67,18 @@ def test_a_model_that_did_not_see_sequences_cannot_have_learned(world: Path) -> 
         belief(world, learned)
 
 
-def test_a_file_that_is_not_there_is_named(world: Path) -> None:
+def test_names_that_do_not_exist_are_refused_at_once(world: Path) -> None:
     with pytest.raises(ModelError, match=r"^leraned: no such file; transitions are fixed, learned, or a file"):
-        belief(world, Decoding(transition="leraned"))
+        Decoding(transition="leraned")  # type: ignore[arg-type]
+    with pytest.raises(ModelError, match="per 'hour' is unknown; choose one of update, frame, second"):
+        Decoding(per="hour")  # type: ignore[arg-type]
+    # Before a model is read.
+    for call in (
+        lambda: decode([world / "none.tsv"], world / "none", scorer="srilm"),  # type: ignore[arg-type]
+        lambda: load_decoder("wu2009", world / "none", scorer="srilm"),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(ModelError, match="scorer 'srilm' is unknown; choose native or kenlm"):
+            call()
 
 
 def test_per_second_follows_the_clock(world: Path) -> None:

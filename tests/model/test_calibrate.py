@@ -160,9 +160,9 @@ def test_decode_applies_it(world: Path, caplog: pytest.LogCaptureFixture) -> Non
 def test_a_file_of_transitions_is_known_by_its_numbers(world: Path, caplog: pytest.LogCaptureFixture) -> None:
     steps = world / "steps.tsv"
     steps.write_text("hall\tkitchen\toffice\n" + "0.8\t0.1\t0.1\n0.1\t0.8\t0.1\n0.1\t0.1\t0.8\n")
-    calibrate(world / "model", [world / "tokens/run3.tsv"], options=Decoding(transition=str(steps)))
+    calibrate(world / "model", [world / "tokens/run3.tsv"], options=Decoding(transition=steps))
     steps.rename(world / "moved.tsv")
-    asked = Decoding(transition=str(world / "moved.tsv"), calibrated=True)
+    asked = Decoding(transition=world / "moved.tsv", calibrated=True)
     decode([world / "tokens/run5.tsv"], world / "model", options=asked)
     assert caplog.messages == []
     (world / "moved.tsv").write_text((world / "moved.tsv").read_text().replace("0.8\t0.1\t0.1", "0.7\t0.2\t0.1"))

@@ -85,7 +85,7 @@ def test_models_of_two_vocabularies_are_refused(world: Path) -> None:
 
 def test_unknown_scorers_and_probabilities_are_refused(world: Path) -> None:
     with pytest.raises(ModelError, match="scorer 'magic' is unknown; choose native or kenlm"):
-        load_recognizer(world / "model", scorer="magic")
+        load_recognizer(world / "none", scorer="magic")  # type: ignore[arg-type]
     for stay in (-0.1, 1.1, math.nan):
         with pytest.raises(ModelError, match="is not between 0 and 1"):
             load_recognizer(world / "model", options=Decoding(stay=stay))

@@ -40,6 +40,7 @@ from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints, MakeP
 from placerec.methods.margins import frame_by_frame, likelihoods
 from placerec.methods.tables import PairEmissions
 from placerec.model import Decoding, ModelOptions, PlaceModels, load_model, train_model, transition_of
+from placerec.model.decoding import TransitionName
 from placerec.model.record import record_streams
 from placerec.vision import Descriptors, Dictionary, descriptor
 from placerec.vision.chunks import spooled
@@ -240,7 +241,7 @@ def train_models(encoded: EncodedSequences, training: int, cache: Path) -> Place
     return load_model(path)
 
 
-def _words(name: str, transition: str = "fixed") -> ComparedMethod:
+def _words(name: str, transition: TransitionName = "fixed") -> ComparedMethod:
     """A method of `placerec decode`."""
     options = Decoding(transition=transition)
     return ComparedMethod(lambda benchmark: _decoded(make_decoder(name, benchmark.models, options=options), benchmark))

@@ -1,7 +1,7 @@
 """What came of a comparison of methods: a score each, every pair over the same draws, as tables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from placerec.errors import counted
@@ -40,6 +40,10 @@ class Comparison:
     majority_place: str
     drawn: tuple[int, str]
     cost: FrontEndCost
+
+    def to_dict(self) -> dict[str, list[object]]:
+        """A table with a row for each method: `pandas.DataFrame(comparison.to_dict())`, and so for polars."""
+        return {one.name: [getattr(score, one.name) for score in self.scores] for one in fields(MethodScore)}
 
     def best_first(self) -> list[MethodScore]:
         """All methods by accuracy, the best first; of equals the first by name."""

@@ -19,6 +19,7 @@ from placerec.hohmm import Beliefs, Emissions, Transition, fixed_transition, lea
 from placerec.hohmm.decoder import warn_of_unlisted
 from placerec.hohmm.evidence import DictionaryModels, evidence_in
 from placerec.hohmm.posterior import posterior
+from placerec.hohmm.transitions import Per
 from placerec.lm import NgramCounts, count_ngrams
 from placerec.lm.arpa import as_printed
 from placerec.lm.backoff import unite_models
@@ -52,7 +53,7 @@ class CellJob:
     select: str
     cells: tuple[GridCell, ...]
     stay: float
-    per: str
+    per: Per
     kept: Path
 
     def name(self, cell: GridCell) -> str:

@@ -32,10 +32,11 @@ from placerec.errors import ExperimentError, PlacerecError
 from placerec.experiments.grid.splits import SPLITS
 from placerec.files import read_text
 from placerec.hohmm import PER
+from placerec.hohmm.transitions import Per
 from placerec.lm import SMOOTHINGS
 from placerec.model.decoding import NAMED, STAY
 from placerec.model.options import MAX_ORDER
-from placerec.vision.options import UNITS
+from placerec.vision.options import UNITS, Units
 from placerec.words import parse_selection
 
 
@@ -55,8 +56,8 @@ class Config:
     transition: tuple[str, ...]
     seeds: int
     stay: float
-    per: str
-    units: str
+    per: Per
+    units: Units
     as_in_paper: bool
 
     def tokens_folder(self, size: int, seed: int) -> Path:

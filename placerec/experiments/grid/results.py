@@ -130,6 +130,10 @@ class Results:
             total[1] += row.frames
         return [right / frames for right, frames in counts.values()]
 
+    def to_dict(self) -> dict[str, list[object]]:
+        """The columns of results.csv: `pandas.DataFrame(results.to_dict())`, and so for polars."""
+        return {name: [getattr(row, name) for row in self.rows] for name in COLUMNS}
+
 
 def by_seed(
     rows: Iterable[Row], share: Callable[[SequenceCount], int] = lambda one: one.right
