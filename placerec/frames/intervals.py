@@ -8,7 +8,7 @@ import logging
 import math
 import os
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -53,9 +53,9 @@ class Intervals:
         if not times or not self.intervals:
             return [""] * len(times)
         from_start = clock == "start" or (clock == "auto" and self.intervals[-1].end <= times[0])
-        found = self._at(times, times[0] if from_start else 0.0)
+        found = self.places_at(times, times[0] if from_start else 0.0)
         if clock == "auto" and times[0] and (from_start or times[0] < EPOCH):
-            other = self._at(times, 0.0 if from_start else times[0])
+            other = self.places_at(times, 0.0 if from_start else times[0])
             if times[0] >= EPOCH or found == other:
                 level, remedy = logging.INFO, ""
             else:
@@ -66,7 +66,8 @@ class Intervals:
             log.warning("%s: labels none of the %s", self.path, counted(len(times), "frame"))
         return found
 
-    def _at(self, times: Sequence[float], zero: float) -> list[str]:
+    def places_at(self, times: Sequence[float], zero: float) -> list[str]:
+        """The place at each of these times, "" where there is none; the file's seconds count from `zero`."""
         starts = [one.start for one in self.intervals]
         found = []
         for time in times:
@@ -83,8 +84,13 @@ def read_intervals(path: Path) -> Intervals:
     Raises SourceError naming file and line: what is no interval, one that ends before it starts, two that overlap, a
     name that cannot be a place's.
     """
+    return parse_intervals(read_lines(path, SourceError), path)
+
+
+def parse_intervals(lines: Iterable[str], path: Path) -> Intervals:
+    """The intervals in the lines of a labels file, which `path` names; raises what `read_intervals` raises."""
     found = []
-    for number, line in enumerate(read_lines(path, SourceError), start=1):
+    for number, line in enumerate(lines, start=1):
         fields = line.partition("#")[0].split()
         if fields:
             found.append(_interval(path, number, fields))
@@ -108,14 +114,18 @@ def find_intervals(
         if not alone:
             raise SourceError(f"{labels}: is one file for several recordings; name a folder that holds {name}{SUFFIX}")
         return read_intervals(labels)
-    here = source if source.name not in ("", "..") else Path(os.path.abspath(source))
-    own = here.name if here.is_dir() else here.stem
-    path = here.parent / f"{own}{SUFFIX}" if labels is None else labels / f"{name}{SUFFIX}"
+    path = intervals_beside(source) if labels is None else labels / f"{name}{SUFFIX}"
     if path.exists():
         return read_intervals(path)
     missing = "places.lst" if labels is None and images else path
     log.log(logging.INFO if labels is None else logging.WARNING, "%s: no %s; its frames have no label", source, missing)
     return None
+
+
+def intervals_beside(source: Path) -> Path:
+    """Where the labels of a recording or a folder of images are looked for: NAME.labels beside it."""
+    here = source if source.name not in ("", "..") else Path(os.path.abspath(source))
+    return here.parent / f"{here.name if here.is_dir() else here.stem}{SUFFIX}"
 
 
 def _interval(path: Path, number: int, fields: list[str]) -> Interval:

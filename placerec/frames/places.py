@@ -72,9 +72,14 @@ def read_places(path: Path, images: Collection[str] = ()) -> PlaceList:
 
     Raises SourceError naming file and line: no label, a name that cannot be a place's, two labels for one image.
     """
+    return parse_places(read_lines(path, SourceError), path, images)
+
+
+def parse_places(text: Iterable[str], path: Path, images: Collection[str] = ()) -> PlaceList:
+    """The labels in the lines of a places.lst, which `path` names; raises what `read_places` raises."""
     places: dict[str, str] = {}
     lines: dict[str, int] = {}
-    for number, line in enumerate(read_lines(path, SourceError), start=1):
+    for number, line in enumerate(text, start=1):
         if not line.strip():
             continue
         image, place = _split(path, number, line.strip(), images)
