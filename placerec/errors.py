@@ -38,6 +38,10 @@ class ExperimentError(PlacerecError):
     """The description of an experiment, or data that do not fit it."""
 
 
+class PageError(PlacerecError):
+    """A page that cannot be served, or cannot show what it is given."""
+
+
 class OutputError(PlacerecError):
     """An output that cannot be written."""
 

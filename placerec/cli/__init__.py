@@ -11,7 +11,7 @@ from typing import Any
 import click
 from click.exceptions import NoArgsIsHelpError
 
-from placerec.cli import experiments, images, learning, models, reports
+from placerec.cli import experiments, images, learning, models, pages, reports
 from placerec.cli.srilm import SRILM_COMMANDS
 from placerec.errors import PlacerecError
 from placerec.version import __version__
@@ -61,7 +61,7 @@ class Misuse(Failure):
 # Commands by what people do; those of SRILM follow.
 GROUPS = {
     "Your images": (
-        *("learn", "describe", "train-words", "tokenize", "train-lm"),
+        *("label", "learn", "describe", "train-words", "tokenize", "train-lm"),
         *("decode", "evaluate", "calibrate", "update"),
     ),
     "Look": ("report", "show-words", "show-frame", "stability", "inspect"),
@@ -120,7 +120,7 @@ def commands() -> None:
     """Which place is the camera in? Images become words, places become language models."""
 
 
-for module in (learning, images, models, reports, experiments):
+for module in (learning, images, models, pages, reports, experiments):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)

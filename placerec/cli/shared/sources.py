@@ -19,8 +19,40 @@ def source_arguments(function: Command) -> Command:
     return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH_OR_STREAM)(function)
 
 
-def reading_options(note: str = "") -> Callable[[Command], Command]:
-    """--format, --every, --topic, --labels...: how sources are to be read. The command gets `source_options`."""
+def whole_source_arguments(function: Command) -> Command:
+    """SOURCE..., of which no part can be taken, and how it is read otherwise: `sources` and `source_options`."""
+    function = reading_options(part=False)(function)
+    return click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)(function)
+
+
+def _part_options(function: Command) -> Command:
+    """--every, --from, --to."""
+    every = groups.source(
+        "--every", metavar="N", type=click.IntRange(min=1), default=1, help="Read the first of every N frames."
+    )
+    begin = groups.source(
+        "--from",
+        "begin",
+        metavar="S",
+        type=FiniteRange(min=0),
+        default=0.0,
+        help="Read each sequence from this second on, counted from the first frame.",
+    )
+    end = groups.source(
+        "--to",
+        "end",
+        metavar="S",
+        type=FiniteRange(min=0, min_open=True),
+        help="Read no frame from this second on.",
+    )
+    return every(begin(end(function)))
+
+
+def reading_options(note: str = "", *, part: bool = True) -> Callable[[Command], Command]:
+    """--format, --every, --topic, --labels...: how sources are to be read. The command gets `source_options`.
+
+    `part`: whether a part of each can be read.
+    """
 
     def decorated(function: Command) -> Command:
         @groups.source(
@@ -29,9 +61,6 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
             type=click.Choice(["auto", "sequences", "places"]),
             default="auto",
             help=f"What a folder of folders{note} is: sequences, or one folder per place.",
-        )
-        @groups.source(
-            "--every", metavar="N", type=click.IntRange(min=1), default=1, help="Read the first of every N frames."
         )
         @groups.source("--topic", metavar="NAME", help="The images of a bag to read, if it has several topics of them.")
         @groups.source(
@@ -43,21 +72,6 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
         )
         @groups.source(
             "--camera", metavar="NAME", help="The camera to read of a run of several.  [default: colour, or left]"
-        )
-        @groups.source(
-            "--from",
-            "begin",
-            metavar="S",
-            type=FiniteRange(min=0),
-            default=0.0,
-            help="Read each sequence from this second on, counted from the first frame.",
-        )
-        @groups.source(
-            "--to",
-            "end",
-            metavar="S",
-            type=FiniteRange(min=0, min_open=True),
-            help="Read no frame from this second on.",
         )
         @groups.source(
             "--rate",
@@ -76,11 +90,11 @@ def reading_options(note: str = "") -> Callable[[Command], Command]:
             from placerec.frames.sequence import SourceOptions
 
             settings = {field.name: options.pop(field.name) for field in fields(SourceOptions) if field.name in options}
-            end = settings["end"]
+            end = settings.get("end")
             with usage("--labels" if end is None or settings["begin"] < end else "--to"):
                 source_options = SourceOptions(format_, **settings)
             return function(*args, source_options=source_options, **options)
 
-        return read
+        return _part_options(read) if part else read
 
     return decorated
