@@ -50,6 +50,7 @@ _ROOMS = {
     "placerec.inspection.frame": ("show_frame",),
     "placerec.inspection.word_sheet": ("show_words",),
     "placerec.inspection.word_stability": ("stability",),
+    "placerec.page.label": ("label_pages",),
     "placerec.page.report": ("report",),
     "placerec.lab.layout": ("render_lab",),
 }
@@ -86,6 +87,7 @@ if TYPE_CHECKING:
     from placerec.lm.text import train_ngrams
     from placerec.methods import decode, follow_live, load_decoder
     from placerec.model import Decoding, ModelOptions, calibrate, load_recognizer, train_lm, update
+    from placerec.page.label import label_pages
     from placerec.page.report import report
     from placerec.vision import (
         DescriptorSpec,
@@ -138,6 +140,7 @@ __all__ = [
     "gist",
     "inspect_decision",
     "inspect_model",
+    "label_pages",
     "learn",
     "learned_transition",
     "load_decoder",

@@ -42,6 +42,7 @@ PYTHON = {
     "evaluate": "evaluate_files",
     "inspect": "inspect_model inspect_decision",
     "lab": "render_lab",
+    "label": "label_pages",
     "train-words": "train_dictionary",
     "demo": "",
 }

@@ -87,7 +87,9 @@ def places_of(sent: Any, count: int) -> list[str]:
     before = 0
     for one in _sequence(sent):
         match _sequence(one):
-            case [int(start), int(end), str(place)] if before <= start < end <= count and 0 < len(place) <= MAX_NAME:
+            case [int(start), int(end), str(place)] if (
+                before <= start < end <= count and 0 < len(place) <= MAX_NAME and bool not in (type(start), type(end))
+            ):
                 places[start:end] = [place] * (end - start)
                 before = end
             case _:
