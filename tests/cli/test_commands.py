@@ -37,8 +37,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_all_commands_of_the_contract_so_far_are_there() -> None:
     expected = (
-        "adapt-lm calibrate check compare decode demo describe evaluate experiment inspect lab learn report show-frame "
-        "show-words stability tokenize train-lm train-words update"
+        "adapt-lm calibrate check compare decode demo describe evaluate experiment inspect lab label learn report "
+        "show-frame show-words stability tokenize train-lm train-words update"
     )
     assert " ".join(NAMES) == expected
     assert set(commands.commands) == {*NAMES, *TOOLS}
@@ -62,7 +62,7 @@ def test_commands_are_listed_by_what_people_do() -> None:
     text = done("--help").stdout
     groups = dict(re.findall(r"^(\S.*):\n((?:  .*\n)+)", text.partition("placerec learn")[0], re.MULTILINE))
     assert list(groups)[1:] == ["Your images", "Look", "Language models", "Experiments", "SRILM's tools"]
-    assert re.findall(r"^  (\S+)", groups["Your images"], re.MULTILINE)[:2] == ["learn", "describe"]
+    assert re.findall(r"^  (\S+)", groups["Your images"], re.MULTILINE)[:3] == ["label", "learn", "describe"]
     assert re.findall(r"^  (\S+)", groups["SRILM's tools"], re.MULTILINE) == list(TOOLS)
 
 
