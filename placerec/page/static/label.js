@@ -190,7 +190,7 @@ function lookAt(number) {
 
 // ---- changes
 
-function change(stretches) {
+function edit(stretches) {
   const real = desk.change([[desk.now, stretches]]);
   if (page.proposal) showLooks();
   return real;
@@ -200,7 +200,7 @@ function press(place) {
   const { drive } = desk;
   const { frame } = strip;
   const [from, to] = strip.mark || [frame, pieceAt(drive.stretches, frame, drive.count)[1]];
-  change(labelled(drive.stretches, from, to, place));
+  edit(labelled(drive.stretches, from, to, place));
   strip.setMark(null);
   page.mark = null;
 }
@@ -208,7 +208,7 @@ function press(place) {
 function clear() {
   const { drive } = desk;
   const [from, to] = strip.mark || pieceAt(drive.stretches, strip.frame, drive.count);
-  change(labelled(drive.stretches, from, to, ""));
+  edit(labelled(drive.stretches, from, to, ""));
   strip.setMark(null);
 }
 
@@ -218,14 +218,14 @@ function moveBorder(by) {
   if (!borders.length) return;
   const near = borders.reduce((best, one) => (Math.abs(one - strip.frame) < Math.abs(best - strip.frame) ? one : best));
   const moved = movedBorder(drive.stretches, near, near + by, drive.count);
-  if (change(moved)) strip.go(Math.min(near + by, drive.count - 1));
+  if (edit(moved)) strip.go(Math.min(near + by, drive.count - 1));
 }
 
 function dragged(row, border, frame, done) {
   const { drive } = desk;
   const moved = movedBorder(drive.stretches, border, frame, drive.count);
   page.dragged = done ? null : moved;
-  if (done) change(moved);
+  if (done) edit(moved);
   else show();
 }
 
@@ -241,7 +241,7 @@ function accept(all) {
     // One that is labelled otherwise is replaced only where it is looked at.
     for (const [a, b] of parts.length || all ? parts : [[from, to]]) stretches = labelled(stretches, a, b, place);
   }
-  change(stretches);
+  edit(stretches);
 }
 
 function rename() {
@@ -289,8 +289,8 @@ function setMark() {
 const KEYS = {
   n: () => byId("name").focus(),
   m: setMark,
-  s: () => change(split(desk.drive.stretches, strip.frame)),
-  j: () => change(joined(desk.drive.stretches, strip.frame, desk.drive.count)),
+  s: () => edit(split(desk.drive.stretches, strip.frame)),
+  j: () => edit(joined(desk.drive.stretches, strip.frame, desk.drive.count)),
   r: learn,
   Delete: clear,
   Backspace: clear,
