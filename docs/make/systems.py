@@ -1,11 +1,13 @@
 """The tables of docs/systems.md: every method on every set, by `placerec compare` for five maps and every fold.
 
-python docs/make/systems.py DATA/SET... -o docs/systems [--test GLOB ...] [--size S] [--work DIR]
+python docs/make/systems.py DATA/SET... -o docs/systems [--test GLOB ...] [--split NAME] [--size S] [--work DIR]
 
 Sequences that a GLOB names are tested together, all others train; in a set without any, each sequence is tested in turn
-and the others train. For every set: methods.csv (means over the maps; latency is a mean of medians), pairs.csv and
-methods.svg as `placerec compare` writes them, with intervals over the test sequences of all folds; a sequence counts
-with its mean over the maps. A run that was stopped goes on where it was: what is done is in DIR.
+and the others train, or each group of sequences of a split of `placerec experiment`: leave-one-illumination-out tests
+on one light what learned in the others. For every set: methods.csv (means over the maps; latency is a mean of
+medians), pairs.csv and methods.svg as `placerec compare` writes them, with intervals over the test sequences of all
+folds; a sequence counts with its mean over the maps. A run that was stopped goes on where it was: what is done is in
+DIR.
 """
 
 import argparse
@@ -29,6 +31,7 @@ from placerec.experiments.comparison.results import (
     judge,
 )
 from placerec.experiments.comparison.run import SIZE, compare
+from placerec.experiments.grid.splits import SPLITS
 from placerec.files import write_text
 from placerec.frames import find_sequences
 from placerec.hohmm import read_beliefs
@@ -38,11 +41,11 @@ SEEDS = range(5)
 MEANS = tuple(name for name in MethodScore.__annotations__ if name not in ("method", "accuracy_low", "accuracy_high"))
 
 
-def folds(folder: Path, test: Sequence[str]) -> list[list[Path]]:
-    """The test sequences of each fold: those that `test` names, or else one after the other."""
-    sequences = [sequence.source for sequence in find_sequences([folder])]
-    named = [path for path in sequences if any(fnmatchcase(path.name, glob) for glob in test)]
-    return [named] if named else [[path] for path in sequences]
+def folds(folder: Path, test: Sequence[str], split: str) -> list[list[Path]]:
+    """The test sequences of each fold: those that `test` names, or else those of the split."""
+    sequences = {sequence.name: sequence.source for sequence in find_sequences([folder])}
+    named = [path for path in sequences.values() if any(fnmatchcase(path.name, glob) for glob in test)]
+    return [named] if named else [[sequences[name] for name in fold.test] for fold in SPLITS[split]([*sequences])]
 
 
 def together(parts: Sequence[tuple[Path, Comparison]], seed: int) -> dict[str, MethodRun]:
@@ -75,13 +78,13 @@ def mean_of(found: Sequence[Comparison], rights: Sequence[dict[str, np.ndarray]]
     return replace(found[0], scores=tuple(scores), pairs=pairs, cost=FrontEndCost(*np.mean(costs, axis=0).tolist()))
 
 
-def compared(folder: Path, test: Sequence[str], size: int, work: Path) -> Comparison:
-    """A set's comparison."""
+def compared(folder: Path, tests_of: Sequence[Sequence[Path]], size: int, work: Path) -> Comparison:
+    """A set's comparison, given the test sequences of each fold."""
     found, rights, frames = [], [], np.empty(0, np.int64)
     for seed in SEEDS:
         parts = []
-        for number, tests in enumerate(folds(folder, test)):
-            out = work / folder.name / f"size{size}-seed{seed}-fold{number}"
+        for number, tests in enumerate(tests_of):
+            out = work / folder.name / f"size{size}-seed{seed}-fold{number}-of-{len(tests_of)}"
             parts.append((out, compare([folder], tests, out, size=size, seed=seed, cache=work / "cache")))
         runs = together(parts, seed)
         found.append(judge(runs, parts[0][1].cost, seed))
@@ -117,13 +120,14 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", metavar="DATA/SET", nargs="+", type=Path)
     parser.add_argument("--test", metavar="GLOB", action="append", default=[], help="names of the test sequences")
+    parser.add_argument("--split", choices=SPLITS, default="leave-one-out", help="without tests that are named")
     parser.add_argument("--size", type=int, default=SIZE, help="side of the maps")
     parser.add_argument("-o", "--out", metavar="DIR", type=Path, required=True, help="where the tables go")
     parser.add_argument("--work", metavar="DIR", type=Path, default=Path("systems-work"), help="what is kept of runs")
     options = parser.parse_args()
     logging.disable(logging.WARNING)
     for data in options.data:
-        result = compared(data, options.test, options.size, options.work)
+        result = compared(data, folds(data, options.test, options.split), options.size, options.work)
         write_text(options.out / data.name / "methods.csv", format_methods(result.scores))
         write_text(options.out / data.name / "pairs.csv", format_pairs(result.pairs))
         plot_comparison(result, options.out / data.name / "methods.svg")

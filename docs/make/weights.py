@@ -1,0 +1,254 @@
+"""The tables of docs/recognizer.md on several dictionaries and what their words weigh, and the results behind them.
+
+python docs/make/weights.py [DATA] [--set NAME ...] [--work DIR]
+
+With DATA, the folder of the sets, every fold of FOLDS is run for the seeds 0 to 2: METHODS by `placerec compare`, and
+VARIANTS of what `placerec learn` makes. What was done is kept in DIR, so that a run that was stopped goes on, and
+docs/recognizer/weights.csv gets all of it. Then the tables of the page are written anew, if there are all results.
+"""
+
+import argparse
+import csv
+import io
+import json
+import logging
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import groupby
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from experiment_page import SLOT
+
+from placerec import learn
+from placerec.evaluation.metrics import evaluate
+from placerec.experiments.comparison.run import compare
+from placerec.experiments.grid.report import Table, markdown
+from placerec.files import write_text
+from placerec.methods import HOHMM, decode
+from placerec.model import Decoding, ModelOptions, train_lm
+from placerec.model.decoding import AS_LEARNED
+from placerec.vision import DictionarySetOptions
+
+PAGE = Path(__file__).parents[1] / "recognizer.md"
+RESULTS = PAGE.with_suffix("") / "weights.csv"
+SEEDS = range(3)
+# Names of the sequences that test, fold by fold; all others of the set train.
+FOLDS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "go2home": (("run03*", "run09*", "run15*", "run21*"), ("run05*", "run11*", "run17*", "run23*")),
+    "ietower": (
+        ("floor03", "floor07", "floor11"),
+        ("floor04", "floor08", "floor12"),
+        ("floor05", "floor09", "floor13"),
+        ("floor06", "floor10"),
+    ),
+    "multifloor": (("floor1",), ("floor2",), ("floor3",), ("floor4",)),
+    "rtabmap_corridor": (("lap1",), ("lap2",)),
+}
+METHODS = (
+    *(HOHMM, f"{HOHMM}-single", f"{HOHMM}-paper", "rbf-svm-hmm", "rbf-svm", "logistic-hmm", "logistic", "knn"),
+    *("ullah2008-hmm", "ullah2008", "torralba2003", "rbf-svm-hmm@tuned", "rbf-svm-hmm@pn-tuned"),
+)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Another way to learn than the default, or to use what it learned.
+
+    `words`: options of the dictionaries. `short`: weights from the token streams alone, words are not learned anew.
+    """
+
+    name: str
+    words: Mapping[str, Any] = field(default_factory=dict)
+    options: ModelOptions = ModelOptions()
+    short: bool = False
+    decoding: Decoding = AS_LEARNED
+
+
+# Those that learn alike follow each other.
+VARIANTS = (
+    Variant("the default"),
+    Variant("weights from the token streams alone", short=True),
+    Variant("alpha 1, memory 0", decoding=Decoding(alpha=1.0, memory=0.0)),
+    Variant("memory 0", decoding=Decoding(memory=0.0)),
+    Variant("fixed transitions", decoding=Decoding(transition="fixed", alpha=1.0, memory=0.0)),
+    Variant("size 10", {"sizes": (10,)}),
+    Variant("size 20", {"sizes": (20,)}),
+    Variant("sizes 15, 20", {"sizes": (15, 20)}),
+    Variant("sizes 10, 15, 20", {"sizes": (10, 15, 20)}),
+    Variant("view plain", {"views": ("plain",)}),
+    Variant("view pn", {"views": ("pn",)}),
+    Variant("order 1", options=ModelOptions(1)),
+    Variant("order 3", options=ModelOptions(3)),
+    Variant("lidstone", options=ModelOptions(2, "lidstone")),
+)
+
+
+class Result(NamedTuple):
+    """A line of weights.csv: what a method or a variant does on the tests of a fold, with one seed."""
+
+    kind: str
+    name: str
+    set: str
+    fold: int
+    seed: int
+    frames: int
+    accuracy: float
+    ece: float
+    log_loss: float
+    change_latency_frames: float | None
+
+
+# What is measured, by name.
+Figures = dict[str, Any]
+MEASURED = Result._fields[5:]
+
+
+def compared(training: Sequence[Path], tests: Sequence[Path], seed: int, work: Path) -> dict[str, Figures]:
+    """The figures of METHODS on a fold."""
+    found = compare(training, tests, work / "compare", methods=METHODS, seed=seed, cache=work.parent / "cache")
+    return {
+        one.method: {"frames": found.frames} | {name: getattr(one, name) for name in MEASURED[1:]}
+        for one in found.scores
+    }
+
+
+def varied(
+    training: Sequence[Path], tests: Sequence[Path], seed: int, variants: Iterable[Variant], folder: Path
+) -> dict[str, Figures]:
+    """The figures of some variants that learn alike, in a `folder` for models and beliefs."""
+    figures, model, short = {}, folder / "model", folder / "short"
+    for variant in variants:
+        if not model.exists():
+            learn(
+                training,
+                model,
+                words=replace(DictionarySetOptions(seed=seed), **variant.words),
+                options=variant.options,
+            )
+        if variant.short:
+            train_lm([model / "tokens"], short, options=variant.options)
+        used = short if variant.short else model
+        beliefs = decode(tests, used, words=model / "words.npz", out=folder / "beliefs", options=variant.decoding)
+        figures[variant.name] = {name: getattr(evaluate(beliefs), name) for name in MEASURED}
+    return figures
+
+
+def kept(path: Path, work: Callable[[], dict[str, Figures]]) -> dict[str, Figures]:
+    """What a file of an earlier run holds, or the `work` does, which then is kept there."""
+    if path.exists():
+        found: dict[str, Figures] = json.loads(path.read_text(encoding="utf-8"))
+        return found
+    done = work()
+    write_text(path, json.dumps(done, indent=1) + "\n")
+    return done
+
+
+def run(data: Path, sets: Sequence[str], work: Path) -> Iterator[Result]:
+    """The results of all folds and seeds of some sets."""
+    for name in sets:
+        sequences = sorted(path for path in (data / name).iterdir() if path.is_dir())
+        for seed in SEEDS:
+            for number, globs in enumerate(FOLDS[name]):
+                tests = [path for glob in globs for path in sequences if path.match(glob)]
+                training = [path for path in sequences if path not in tests]
+                own = work / name / f"seed{seed}-fold{number}"
+                found = kept(own / "compare.json", partial(compared, training, tests, seed, own))
+                yield from (Result("method", one, name, number, seed, **of) for one, of in found.items())
+                for at, (_, same) in enumerate(groupby(VARIANTS, attrgetter("words", "options"))):
+                    with tempfile.TemporaryDirectory() as folder:
+                        varying = partial(varied, training, tests, seed, same, Path(folder))
+                        found = kept(own / f"variants{at}.json", varying)
+                    yield from (Result("variant", one, name, number, seed, **of) for one, of in found.items())
+                sys.stderr.write(f"{name}: seed {seed}, fold {number + 1} of {len(FOLDS[name])}\n")
+
+
+def format_results(results: Iterable[Result]) -> str:
+    """The text of weights.csv."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(Result._fields)
+    writer.writerows([f"{value:.6f}" if isinstance(value, float) else value for value in one] for one in results)
+    return text.getvalue()
+
+
+def read_results(path: Path) -> list[Result]:
+    """The lines of weights.csv."""
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = list(csv.DictReader(file))
+    return [
+        Result(
+            line["kind"],
+            line["name"],
+            line["set"],
+            int(line["fold"]),
+            int(line["seed"]),
+            int(line["frames"]),
+            float(line["accuracy"]),
+            float(line["ece"]),
+            float(line["log_loss"]),
+            float(line["change_latency_frames"]) if line["change_latency_frames"] else None,
+        )
+        for line in lines
+    ]
+
+
+def of_set(results: Iterable[Result], figure: str) -> np.ndarray:
+    """A figure on a set for each seed, (seeds,): the mean over the folds, with their frames as weights."""
+    sums: dict[int, tuple[float, int]] = {}
+    for one in results:
+        value, frames = sums.get(one.seed, (0.0, 0))
+        sums[one.seed] = value + one.frames * getattr(one, figure), frames + one.frames
+    return np.array([value / frames for _, (value, frames) in sorted(sums.items())])
+
+
+def table(results: Sequence[Result], kind: str) -> Table:
+    """A line for each method or variant: accuracy, ECE and log loss on each set, and their means over sets."""
+    sets = list(dict.fromkeys(one.set for one in results))
+    lines = []
+    for name in dict.fromkeys(one.name for one in results if one.kind == kind):
+        own = {of: [one for one in results if (one.kind, one.name, one.set) == (kind, name, of)] for of in sets}
+        right, ece, loss = (
+            np.array([of_set(rows, figure) for rows in own.values()]) for figure in ("accuracy", "ece", "log_loss")
+        )
+        cells = [
+            f"{100 * r.mean():.1f}, {e.mean():.3f}, {n.mean():.2f}" for r, e, n in zip(right, ece, loss, strict=True)
+        ]
+        whole = f"{_spread(100 * right.mean(axis=0), 1)}, {_spread(loss.mean(axis=0), 3)}"
+        lines.append((f"`{name}`" if kind == "method" else name, *cells, whole))
+    return (kind, *sets, "mean"), lines
+
+
+def _spread(seeds: np.ndarray, digits: int) -> str:
+    return f"{seeds.mean():.{digits}f} ± {seeds.std(ddof=1):.{digits}f}"
+
+
+def tables(results: Sequence[Result]) -> dict[str, str]:
+    """What belongs between the marks of the page, by name."""
+    return {f"weights {kind}s": markdown(table(results, kind)) for kind in ("method", "variant")}
+
+
+def filled(page: str, made: Mapping[str, str]) -> str:
+    """The page with these tables anew."""
+    return SLOT.sub(lambda slot: f"{slot[1]}{made.get(slot[2], slot[3])}{slot[4]}", page)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", metavar="DATA", nargs="?", type=Path, help="the folder of the sets")
+    parser.add_argument("--set", action="append", choices=FOLDS, help="run this one only, and leave page and csv alone")
+    parser.add_argument("--work", metavar="DIR", type=Path, default=Path("weights-work"), help="what is kept of runs")
+    options = parser.parse_args()
+    logging.getLogger("placerec").setLevel(logging.ERROR)
+    if options.data:
+        made = list(run(options.data, options.set or list(FOLDS), options.work))
+        if options.set:
+            sys.stdout.write("\n".join(tables(made).values()))
+            sys.exit()
+        write_text(RESULTS, format_results(made))
+    write_text(PAGE, filled(PAGE.read_text(encoding="utf-8"), tables(read_results(RESULTS))))
