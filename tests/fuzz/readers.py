@@ -1,11 +1,12 @@
 """Feeds damaged files to the readers, and shows what they should not have done, with the smallest file that shows it.
 
-    python tests/fuzz/readers.py [text|counts|arpa|arpa-strict] [--seconds 600] [--seed 0]
+    python tests/fuzz/readers.py [NAME] [--seconds 600] [--seed 0]
 
 `text`, `counts` and `arpa` are read as bin/ngram-count and bin/ngram read them, `arpa-strict` as `placerec inspect`
-does. A finding is an exception that is not one of placerec's own, a warning, a run that takes too long, or a result
-that contradicts itself: what was written is read back as something else, two ways to the same result differ, or a
-strictly read model holds what is no log probability. Exit status 1 if there is any.
+does, the files of tools.py as SRILM's other tools do. A finding is an exception that is not one of placerec's own, a
+warning, a run that takes too long, or a result that contradicts itself: what was written is read back as something
+else, two ways to the same result differ, or a strictly read model holds what is no log probability. Exit status 1 if
+there is any.
 """
 
 import argparse
@@ -18,14 +19,14 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from random import Random
 from unittest.mock import patch
 
 import mutations
 import numpy as np
+import tools
+from harness import FindingError, Reader, fixed_model, run, same
 
 from placerec.errors import PlacerecError
 from placerec.lm import estimation
@@ -33,42 +34,11 @@ from placerec.lm.arpa import format_arpa, read_arpa, write_arpa
 from placerec.lm.inspect import inspect_model
 from placerec.srilm.model import arpa_reader
 from placerec.srilm.text import sentences
-from placerec.srilm.text.streams import Streams
 from placerec.srilm.tools.ngram import ngram
 from placerec.srilm.tools.ngram_count import ngram_count
 
 LONGEST_RUN = 20.0
 _SMALL = 5000
-MODEL = (
-    b"\\data\\\nngram 1=5\nngram 2=3\n\n\\1-grams:\n-1\t</s>\n-99\t<s>\t-0.25\n-0.5\ta\t-0.5\n-1\tb\t-0.125\n-1\tc\n\n"
-    b"\\2-grams:\n-0.5\t<s> a\n-0.25\ta b\n-1\tb </s>\n\n\\end\\\n"
-)
-
-
-class FindingError(AssertionError):
-    """A result that contradicts itself."""
-
-
-@dataclass(frozen=True)
-class Reader:
-    """Makes valid inputs, and checks what becomes of any: `check(path, variant)`."""
-
-    valid: Callable[[Random], bytes]
-    check: Callable[[Path, Random], None]
-
-
-def run(tool: Callable[..., int], *arguments: str | Path, stdin: bytes = b"") -> tuple[int, bytes, bytes]:
-    """One run of a tool in this process: status, standard output and error."""
-    out, err = BytesIO(), BytesIO()
-    named = [str(argument) for argument in arguments]
-    status = tool(named, Streams(BytesIO(stdin), out, err))
-    return status, out.getvalue(), err.getvalue()
-
-
-def same(what: str, one: object, other: object) -> None:
-    """Raise FindingError if two results differ."""
-    if one != other:
-        raise FindingError(f"{what}: {one!r:.300} and {other!r:.300}")
 
 
 def check_text(path: Path, rng: Random) -> None:
@@ -107,13 +77,6 @@ def check_weights(path: Path, rng: Random) -> None:
     run(ngram_count, "-text", path, "-text-has-weights", *rng.choice(([], ["-float-counts"])), "-write", "-")
     extra = rng.choice((["-text-has-weights"], ["-escape", "#"], ["-cache", "5"], ["-noise", "a"]))
     run(ngram, "-lm", fixed_model(path), "-ppl", path, *extra)
-
-
-def fixed_model(path: Path) -> str:
-    """A small valid model beside a file."""
-    lm = path.with_name("model.arpa")
-    lm.write_bytes(MODEL)
-    return str(lm)
 
 
 def check_counts_again(out: bytes, status: int) -> None:
@@ -188,6 +151,13 @@ READERS = {
     "counts": Reader(mutations.counts, check_counts),
     "arpa": Reader(mutations.arpa, check_arpa),
     "arpa-strict": Reader(mutations.arpa, check_strict),
+    "map": Reader(tools.word_map, tools.check_map),
+    "classes": Reader(tools.classes, tools.check_classes),
+    "count-model": Reader(tools.count_model, tools.check_count_model),
+    "events": Reader(tools.events, tools.check_events),
+    "classed": Reader(mutations.text, tools.check_classed),
+    "scored": Reader(tools.scored, tools.check_scored),
+    "scripts": Reader(tools.any_of_scripts, tools.check_scripts),
 }
 
 

@@ -245,6 +245,7 @@ def test_a_filter_conditions_the_texts_of_a_batch(texts: Path) -> None:
         (["nothing"], 1, "nothing: No such file or directory"),
         (["empty"], 1, "empty: no texts are listed"),
         (["gone"], 1, "gone.txt: No such file or directory"),
+        (["nul"], 1, "'t0\\x00' is no file name"),
         (["list", "2", "exit 3"], 1, "the filter 'exit 3' ended with status 3"),
         (["list", "2", "cat", "all.txt"], 1, "all.txt: "),
     ],
@@ -254,6 +255,7 @@ def test_a_batch_that_cannot_be_counted_leaves_no_counts(
 ) -> None:
     Path("empty").write_text("# nothing\n")
     Path("gone").write_text("t0\ngone.txt\n")
+    Path("nul").write_text("t0\0\n")
     found, _, error = call(make_batch_counts, *arguments)
     assert (found, complaint in error) == (status, True), error
     assert not list(Path().glob("counts/*"))

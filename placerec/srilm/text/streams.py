@@ -52,7 +52,7 @@ class Streams:
             self._once("input")
             return self.stdin
         with _named(name):
-            path = _path(name)
+            path = path_of(name)
             suffix = _packing(name)
             if not suffix or (os.path.isfile(path) and not _is_packed(path, suffix)):
                 return open(path, "rb")
@@ -75,7 +75,7 @@ class Streams:
             yield self.stdout
             return
         with _named(name):
-            path = os.path.realpath(_path(name))
+            path = os.path.realpath(path_of(name))
             suffix = _packing(name)
             # A device or a pipe has to be written itself; so has a file in a folder that takes no other.
             if os.path.exists(path) and not (os.path.isfile(path) and os.access(os.path.dirname(path), os.W_OK)):
@@ -188,7 +188,10 @@ def exit_status(tool: _Tool) -> _Tool:
     return cast(_Tool, run)
 
 
-def _path(name: str) -> str:
+def path_of(name: str) -> str:
+    """The path that a name stands for, as the system has it; SrilmError for one that none can have."""
+    if "\0" in name:
+        raise SrilmError(f"{name!r} is no file name: there is a NUL in it")
     return os.fsdecode(name.encode("latin-1"))
 
 

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 from placerec.srilm.text.numbers import leading_int
 from placerec.srilm.text.pipes import as_file, filtered, joined
-from placerec.srilm.text.streams import SrilmError, Streams, exit_status
+from placerec.srilm.text.streams import SrilmError, Streams, exit_status, path_of
 from placerec.srilm.tools.assignments import HELP, records
 from placerec.srilm.tools.ngram_count import ngram_count
 from placerec.srilm.tools.ngram_merge import ngram_merge
@@ -71,12 +71,12 @@ def merge_batch_counts(arguments: Sequence[str], streams: Streams, tool: str = "
         return 0
     _make_folder(folder)
     final = f"{folder}/merge-iter{_iterations(len(files), width)}-1.ngrams.gz"
-    with TemporaryDirectory(dir=_path(folder)) as between:
+    with TemporaryDirectory(dir=path_of(folder)) as between:
         status = _merge(files, final, options, streams, tool, os.fsencode(between).decode("latin-1"))
     if status:
         return status
     for file in () if listed else files:
-        os.unlink(_path(file))
+        os.unlink(path_of(file))
     streams.say(f"final counts in {final}")
     return 0
 
@@ -126,13 +126,9 @@ def _merge(files: Sequence[str], final: str, options: Sequence[str], streams: St
     return ngram_merge([*options, "-write", final, "--", *files], streams, tool)
 
 
-def _path(name: str) -> str:
-    return os.fsdecode(name.encode("latin-1"))
-
-
 def _make_folder(name: str) -> None:
     try:
-        Path(_path(name)).mkdir(parents=True, exist_ok=True)
+        Path(path_of(name)).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise SrilmError(f"{name}: {error.strerror or error}") from error
 
@@ -140,7 +136,7 @@ def _make_folder(name: str) -> None:
 def _batches(folder: str) -> list[str]:
     """What make-batch-counts left in a folder, in the order of the batches."""
     try:
-        names = [name for name in os.listdir(_path(folder)) if _BATCH.fullmatch(name)]
+        names = [name for name in os.listdir(path_of(folder)) if _BATCH.fullmatch(name)]
     except FileNotFoundError:
         return []
     except OSError as error:

@@ -1,5 +1,6 @@
 """SRILM's tools on places: the same answers as placerec's own where the models are the same."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,7 @@ def test_disambig_finds_the_places_that_viterbi_decoding_finds(
     for stream, line in zip(streams, out.splitlines(), strict=True):
         best = recognizer.decode(stream, viterbi=True).best
         assert line.split()[1:] == list(best)
-        changes += sum(a != b for a, b in zip(best, best[1:], strict=False))
+        changes += sum(a != b for a, b in pairwise(best))
     assert changes > 6
     # Decided frame by frame, by all words of the sequence, places are those of smoothing.
     _, out, _ = call("disambig", *command, "-fb")
