@@ -209,11 +209,35 @@ def test_encodings_of_bayer(encoding: str) -> None:
     assert len(np.unique(bright)) == 1
 
 
-def test_encodings_that_are_not_read_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "a.jpg").write_bytes(b"\0\0\0\x18ftypheic" + bytes(50))
-    with pytest.raises(SourceError, match="is HEIC, which is not read; convert it to JPEG"):
-        read_gray(tmp_path / "a.jpg")
-    assert rows("Encodings")[-1][0] == "not read"
+# What is not read: the suffix by which a folder leaves it out, and how its files begin, where others are told by it.
+UNREAD = {
+    "HEIC": (".heic", b"\0\0\0\x18ftypheic"),
+    "AVIF": (".avif", b"\0\0\0\x1cftypavif"),
+    "JPEG XL": (".jxl", b"\0\0\0\x0cJXL \r\n\x87\n"),
+    "JPEG 2000": (".jp2", b""),
+    "raw photographs": (".dng", b""),
+}
+
+
+@pytest.mark.parametrize("kind", UNREAD)
+def test_encodings_that_are_not_read_are_told(tmp_path: Path, kind: str, caplog: pytest.LogCaptureFixture) -> None:
+    suffix, start = UNREAD[kind]
+    lay(tmp_path / "run", [*NUMBERED, f"a{suffix}"])
+    (sequence,) = find_sequences([tmp_path / "run"])
+    assert len(sequence.frames) == 3
+    assert f"{tmp_path / 'run'}: not read: 1 *{suffix}; convert them to JPEG" in caplog.text
+    if start:
+        (tmp_path / "a.jpg").write_bytes(start + bytes(50))
+        with pytest.raises(SourceError, match=f"is {kind}, which is not read; convert it to JPEG"):
+            read_gray(tmp_path / "a.jpg")
+
+
+def test_all_that_is_not_read_is_tried() -> None:
+    where, listed, _ = rows("Encodings")[-1]
+    assert where == "not read"
+    assert re.split("[,;] ", listed) == [*UNREAD, "Flatbuffers"]
+    # Which is made by another test.
+    assert '"flatbuffer"' in (Path(__file__).parent / "test_mcap.py").read_text(encoding="utf-8")
 
 
 # Tests in other files that make the rest of the rows.
