@@ -27,6 +27,7 @@ from placerec.jobs import Executor, Progress
 from placerec.version import __version__
 from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionaryOptions, DictionarySet, describe
 from placerec.vision.storage import read_npz, write_npz
+from placerec.vision.work import DESCRIBED
 from placerec.words.folder import VOCABULARY, write_tokens
 from placerec.words.tokenize import tokens_of
 
@@ -96,6 +97,7 @@ def describe_all(
 ) -> list[Described]:
     """Describe the frames of all sequences whose descriptors are not in the folder `cache` yet.
 
+    If other commands keep descriptors there, too (their `--cache`), these are taken, and new ones kept for them.
     `together`: frames that are described before their descriptors are written. `work`: who does the work
     (`jobs.workers`), None for threads. `progress` is called with frames done and in all. Raises ExperimentError
     for a file that cannot be read and for a sequence without a readable image.
@@ -113,7 +115,7 @@ def describe_all(
         frames = sum(len(each.sequence.frames) for each in some)
         if frames >= together or one is missing[-1]:
             shown = (lambda n, _, start=done: progress(start + n, total)) if progress else None
-            _describe(some, spec, work, shown)
+            _describe(some, spec, work, cache if (cache / DESCRIBED).is_dir() else None, shown)
             done, some = done + frames, []
     return described
 
@@ -151,10 +153,14 @@ def _usable(one: Described) -> bool:
 
 
 def _describe(
-    some: Sequence[Described], spec: DescriptorSpec, work: Executor | None, progress: Progress | None
+    some: Sequence[Described],
+    spec: DescriptorSpec,
+    work: Executor | None,
+    shared: Path | None,
+    progress: Progress | None,
 ) -> None:
     sequences = [one.sequence for one in some]
-    found = describe(sequences, spec, work=work, progress=progress)
+    found = describe(sequences, spec, work=work, cache=shared, progress=progress)
     for one, (_, own) in zip(some, _by_sequence(found, sequences, "none of its images can be read"), strict=True):
         _keep(one, own)
 

@@ -27,6 +27,8 @@ from placerec.vision.spec import DescriptorSpec, describer, descriptor
 from placerec.vision.storage import Arrays
 
 log = logging.getLogger(__name__)
+# Where descriptors are, in the folder that commands share.
+DESCRIBED = "described"
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +134,7 @@ def process_batches(
     endless = any(sequence.recording is not None and sequence.recording.endless for sequence in sequences)
     # Ctrl-C ends what a camera records, and would end other processes.
     work = workers() if endless or work is None else work
-    kept = None if endless or cache is None else Cache(Path(cache) / "described")
+    kept = None if endless or cache is None else Cache(Path(cache) / DESCRIBED)
     total = 0 if endless else sum(len(sequence.frames) for sequence in sequences)
     known = 0
     step = _Step(spec, then, kept is not None)

@@ -11,6 +11,7 @@ from helpers.recordings import find_one, write_video
 from helpers.small_world import write_images
 from helpers.typed_commands import SMALL, done, misused
 
+from placerec.experiments.store import describe_all
 from placerec.frames import find_sequences
 from placerec.frames.images import BATCH
 from placerec.jobs import workers
@@ -194,6 +195,20 @@ def test_commands_share_what_lies_beside_their_outputs(tmp_path: Path, monkeypat
         assert "8 of 8 frames were described before: .placerec-cache" in told, (command, told)
         assert "keeps descriptors" not in told
     assert kept(tmp_path / ".placerec-cache") == [one]
+
+
+def test_compare_takes_what_others_described(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for seed, name in enumerate(("run1", "run2")):
+        write_images(tmp_path / "runs" / name, seed)
+    sequences = find_sequences([tmp_path / "runs"])
+    describe(sequences[:1], SPEC, cache=tmp_path / "kept")
+    with caplog.at_level(logging.INFO):
+        found = [describe_all(sequences, SPEC, tmp_path / cache) for cache in ("kept", "own")]
+    assert known(caplog.messages) == ["12 of 24 frames"]
+    for one, own in zip(*found, strict=True):
+        np.testing.assert_array_equal(one.load().values, own.load().values)
+    assert len(kept(tmp_path / "kept")) == 2
+    assert not (tmp_path / "own/described").exists()
 
 
 def test_whoever_wants_none_has_none(tmp_path: Path) -> None:
