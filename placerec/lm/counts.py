@@ -19,7 +19,7 @@ from placerec.errors import LanguageModelError, at, refuse_string
 from placerec.files import all_lines
 from placerec.lm.row_index import RowIndex
 from placerec.lm.stored_text import BLOCK, Block, Numbers, StoredText, changes, distinct_windows
-from placerec.lm.trie import Trie, build_trie, endings, per_context
+from placerec.lm.trie import Trie, closed_trie, per_context
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN, Vocabulary, add_markers, find_markers
 
 if TYPE_CHECKING:
@@ -195,8 +195,7 @@ def tabulate(vocabulary: Vocabulary, order: int, ngrams: Sequence[Ints], values:
 
     Repeated n-grams add up. Prefixes that the table lacks are there with count 0.
     """
-    ends = [matrix for ngram in ngrams for matrix in endings(ngram)]
-    trie, rows = build_trie(vocabulary, order, [*ngrams, *ends])
+    trie, rows = closed_trie(vocabulary, order, ngrams)
     dtype = np.result_type(np.int64, *values)
     counts = [np.zeros(len(keys), dtype) for keys in trie.keys]
     seen = [np.zeros(len(keys), bool) for keys in trie.keys]

@@ -25,7 +25,7 @@ def little_memory() -> Iterator[None]:
     with (
         patch("placerec.srilm.text.sentences._BLOCK", 16),
         patch("placerec.srilm.text.sentences._BATCH", 4),
-        patch("placerec.srilm.text.sentences._MANY", 2),
+        patch("placerec.srilm.text.numbering._MANY", 2),
         patch("placerec.lm.stored_text.BLOCK", 8),
         patch("placerec.lm.stored_text.IN_MEMORY", 8),
         patch("placerec.lm.stored_text.WAITING", 4),

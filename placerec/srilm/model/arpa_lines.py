@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LOG_ZERO
-from placerec.srilm.text.fields import FILLED, Fields, Packed, split_lines, with_odd_bytes
+from placerec.srilm.text.fields import FILLED, Fields, eight_digits, split_lines, with_odd_bytes
 
 # So many numbers are sooner converted one by one.
 _FEW = 200
@@ -91,14 +91,6 @@ def _numbers(fields: Fields, at: Ints, *, most: float) -> Singles | None:
     return single
 
 
-def _every_byte(value: int) -> np.uint64:
-    return np.uint64(value * 0x0101010101010101)
-
-
-_ZEROS = _every_byte(ord("0"))
-_BEHIND_NINE, _HIGH_BITS = _every_byte(0x80 - 10), _every_byte(0x80)
-_EVERY_FOURTH = np.uint64(0x000000FF000000FF)
-_HUNDREDS, _MILLIONS = np.uint64((1000000 << 32) + 100), np.uint64((10000 << 32) + 1)
 _SIGN, _POINT, _BYTE = ord("-"), ord("."), np.uint64(255)
 
 
@@ -111,23 +103,11 @@ def _short_decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     size = fields.lengths[at] - negative - 2
     text >>= np.uint64(8) * negative
     whole = (text & _BYTE) - np.uint64(ord("0"))
-    digits, plain = _eight_digits(fields.eights[start + 2], FILLED.take(size, mode="clip"))
+    digits, plain = eight_digits(fields.eights[start + 2], FILLED.take(size, mode="clip"))
     plain &= (whole <= 9) & (text >> np.uint64(8) & _BYTE == _POINT) & (size >= 0) & (size <= 8)
     # Both are exact, so that the quotient is the float64 nearest to the decimal number.
     value = (whole * np.uint64(10**8) + digits) / 1e8
     return np.where(negative, -value, value), plain
-
-
-def _eight_digits(text: Packed, filled: Packed) -> tuple[Packed, Mask]:
-    """The numbers that eight bytes spell, zeros behind what is `filled`; and whether these are digits."""
-    digit = text ^ _ZEROS
-    digit &= filled
-    plain = (digit | digit + _BEHIND_NINE) & _HIGH_BITS == 0
-    # Pairs of digits, then fours, then all eight at once.
-    pairs = digit * np.uint64(10) + (digit >> np.uint64(8))
-    number = (pairs & _EVERY_FOURTH) * _HUNDREDS + (pairs >> np.uint64(16) & _EVERY_FOURTH) * _MILLIONS
-    number >>= np.uint64(32)
-    return number, plain
 
 
 def _decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:

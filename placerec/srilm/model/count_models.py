@@ -15,7 +15,8 @@ from placerec.lm.counts import NgramCounts, format_counts
 from placerec.lm.logs import log10
 from placerec.lm.score import Contexts, Ngrams, ScoreTables, TokenSequence, build_tables
 from placerec.srilm.model.scorers import Scored, event_mask
-from placerec.srilm.text.counts_file import Table, counted, read_counts, tabled
+from placerec.srilm.text.counts_file import counted
+from placerec.srilm.text.counts_table import Table, read_counts, tabled
 from placerec.srilm.text.numbers import leading_float, leading_int
 from placerec.srilm.text.streams import SrilmError, Streams, tokens
 from placerec.srilm.text.vocabulary import WordList

@@ -14,7 +14,7 @@ from placerec.lm.trie import Trie, runs
 from placerec.srilm.order.contexts import NEVER, ContextTimes, context_ranks
 from placerec.srilm.order.hashing import walk_order
 from placerec.srilm.order.messages import Messages
-from placerec.srilm.text.counts_file import Table
+from placerec.srilm.text.counts_table import Table
 from placerec.srilm.text.vocabulary import WordList
 
 _LONG = 1 << 40
@@ -36,12 +36,12 @@ class FirstSeen:
         first = [np.full(len(keys), NEVER) for keys in trie.keys]
         now = 0
         for table in self.tables:
-            for ngram in table.ngrams:
-                row = np.zeros(1, np.int64)
-                for n, number in enumerate(ngram, start=1):
-                    row = trie.find(n, row, sorted_number[[number]])
-                    first[n - 1][row] = np.minimum(first[n - 1][row], now)
-                now += 1
+            for matrix, places in zip(table.ngrams, table.places, strict=True):
+                row = np.zeros(len(matrix), np.int64)
+                for n, numbers in enumerate(sorted_number[matrix].T, start=1):
+                    row = trie.find(n, row, numbers)
+                    np.minimum.at(first[n - 1], row, now + places)
+            now += table.size
         if self.text is not None:
             for block, found in occurrences(self.text, trie, sorted_number):
                 for its, (position, row) in zip(first, found, strict=True):

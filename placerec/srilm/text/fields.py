@@ -182,3 +182,25 @@ def _mixed(columns: Sequence[Packed]) -> Ints:
         mixed += column * spread
     numbers: Ints = mixed.view(np.int64)
     return numbers
+
+
+def _every_byte(value: int) -> np.uint64:
+    return np.uint64(value * 0x0101010101010101)
+
+
+_ZEROS = _every_byte(ord("0"))
+_BEHIND_NINE, _HIGH_BITS = _every_byte(0x80 - 10), _every_byte(0x80)
+_EVERY_FOURTH = np.uint64(0x000000FF000000FF)
+_HUNDREDS, _MILLIONS = np.uint64((1000000 << 32) + 100), np.uint64((10000 << 32) + 1)
+
+
+def eight_digits(text: Packed, filled: Packed) -> tuple[Packed, Mask]:
+    """The numbers that eight bytes spell, zeros behind what is `filled`; and whether these are digits."""
+    digit = text ^ _ZEROS
+    digit &= filled
+    plain = (digit | digit + _BEHIND_NINE) & _HIGH_BITS == 0
+    # Pairs of digits, then fours, then all eight at once.
+    pairs = digit * np.uint64(10) + (digit >> np.uint64(8))
+    number = (pairs & _EVERY_FOURTH) * _HUNDREDS + (pairs >> np.uint64(16) & _EVERY_FOURTH) * _MILLIONS
+    number >>= np.uint64(32)
+    return number, plain

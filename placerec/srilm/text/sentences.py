@@ -13,7 +13,8 @@ import numpy as np
 from placerec.ahead import make_ahead
 from placerec.arrays import Ints, Mask
 from placerec.lm.vocabulary import add_markers, find_markers
-from placerec.srilm.text.fields import Fields, NameTable, comments, split_lines, usual_blocks, without_lines
+from placerec.srilm.text.fields import comments, split_lines, usual_blocks, without_lines
+from placerec.srilm.text.numbering import Numbering
 from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import Lines, tokens
 from placerec.srilm.text.vocabulary import WordList
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 LONGEST = 50000
 # Bytes read at once where lines are as programs write them, and words where they are not.
 _BLOCK, _BATCH = 1 << 19, 1 << 18
-_MANY = 1000
 
 
 class Handling(NamedTuple):
@@ -85,7 +85,7 @@ def read_sentences(lines: Lines, words: WordList, handling: Handling) -> Iterato
 
 
 def _read_quickly(lines: Lines, blocks: Iterable[bytes], words: WordList, handling: Handling) -> Iterator[Sentences]:
-    numbering = _Numbering(words, handling.adding)
+    numbering = Numbering(words, handling.adding)
     for block in blocks:
         fields, lengths = split_lines(block.lower() if words.lower else block)
         comment = comments(fields, lengths)
@@ -96,34 +96,6 @@ def _read_quickly(lines: Lines, blocks: Iterable[bytes], words: WordList, handli
         lines.number += len(lengths)
         used = lengths[lengths > 0]
         yield Sentences(numbering.numbers(fields), used, np.ones(len(used)))
-
-
-class _Numbering:
-    """Numbers the words of a text, many at a time."""
-
-    def __init__(self, words: WordList, adding: bool) -> None:
-        self.words, self.adding = words, adding
-        self.names = NameTable(words.index)
-        self.asked = 0
-
-    def numbers(self, fields: Fields) -> Ints:
-        """The numbers of words (T,); new ones are added in order of occurrence."""
-        numbers = self.names.find(fields, slice(None))
-        missing = np.flatnonzero(numbers < 0)
-        if not self.adding or (self.words.closed and self.words.meta_tag is None):
-            numbers[missing] = self.words.index[self.words.unknown]
-            self.words.missed += len(missing)
-            return numbers
-        while len(missing):
-            now, missing = np.split(missing, [max(_MANY, self.names.size // 2)])
-            numbers[now] = [self.words.number(fields.text(i).decode("latin-1")) for i in now.tolist()]
-            self.asked += len(now)
-            # Asking one by one has taken about as long as a new table takes.
-            if self.asked > self.names.size // 2:
-                self.names, self.asked = NameTable(self.words.index), 0
-                numbers[missing] = self.names.find(fields, missing)
-                missing = missing[numbers[missing] < 0]
-        return numbers
 
 
 def _read_carefully(lines: Lines, blocks: Iterable[bytes], words: WordList, handling: Handling) -> Iterator[Sentences]:

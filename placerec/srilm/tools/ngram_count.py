@@ -13,7 +13,8 @@ from placerec.lm.prune import prune
 from placerec.lm.stored_text import StoredText
 from placerec.srilm.model.arpa import write_model
 from placerec.srilm.order.counts import EstimationMessages, FirstSeen
-from placerec.srilm.text.counts_file import MOST, TOO_MANY, Table, parse_count, read_counts
+from placerec.srilm.text.counts_file import MOST, TOO_MANY, parse_count
+from placerec.srilm.text.counts_table import Table, read_counts
 from placerec.srilm.text.sentences import handling_of, mark, read_sentences
 from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 from placerec.srilm.text.vocabulary import WordList, format_indices, format_words, read_aliases, read_words
@@ -202,7 +203,7 @@ def _tabulated(
 def _total(tables: Sequence[Table], text: StoredText | None) -> float:
     blocks = text if text is not None and text.weighted else ()
     weights = (block.weights.astype(np.float64) @ block.lengths for block in blocks if block.weights is not None)
-    return float(sum(sum(table.counts) for table in tables) + sum(weights))
+    return float(sum(table.total for table in tables) + sum(weights))
 
 
 def _read_text(options: Parsed, words: WordList, streams: Streams) -> StoredText:
