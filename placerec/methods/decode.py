@@ -5,6 +5,7 @@ import logging
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from placerec.errors import ModelError, OutputError, StreamError, at, counted
 from placerec.files import number_in, whole_folder, write_text
@@ -19,6 +20,9 @@ from placerec.model import Decoding, PlaceModels, load_model
 from placerec.model.decoding import AS_LEARNED, ScorerName, token_streams
 from placerec.words import WordStream
 from placerec.words.folder import dictionary_of, is_stream, stream_files
+
+if TYPE_CHECKING:
+    from placerec.vision import DictionarySet
 
 OWNED = ("*.tsv", "*.jsonl")
 log = logging.getLogger(__name__)
@@ -52,20 +56,14 @@ def decode(
     def opened() -> tuple[SequenceDecoder, list[WordStream]]:
         models = load_model(model)
         path = words or (models.folder.words if _are_images(sources, models) else None)
-        if path is None:
-            decoder = make_decoder(method, models, options=options, scorer=scorer)
+        dictionary = None if path is None else _dictionary_for(sources, path)
+        decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
+        if dictionary is None:
             streams, maker = token_streams(sources, models), dictionary_of(stream_files(sources))
             trained: Collection[str] = maker.trained_on if maker else ()
         else:
-            # Only images need OpenCV and scipy.
-            from placerec.vision import DictionarySet
             from placerec.words.tokenize import streams_of
 
-            for source in sources:
-                if is_stream(Path(source)):
-                    raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {path} out")
-            dictionary = DictionarySet.load(path)
-            decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
             streams = streams_of(sources, dictionary, source_options=source_options, cache=cache, progress=progress)
             trained = dictionary.sequences
         if out is None and len(streams) > 1:
@@ -83,16 +81,32 @@ def decode(
     with whole_folder(Path(out), OWNED) as folder:
         decoder, streams = opened()
         for stream in streams:
-            beliefs = _decoded(decoder, stream, options)
-            suffix = "jsonl" if as_json else "tsv"
-            write_text(folder / f"{stream.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
-            if options.explain and isinstance(decoder, Recognizer):
-                decisions = (json.dumps(one, ensure_ascii=False) + "\n" for one in decoder.explain_stream(stream))
-                write_text(folder / f"{stream.name}{EXPLAINED}", "".join(decisions))
-            found.append(beliefs)
+            found.append(_decoded(decoder, stream, options))
+            _write(folder, decoder, stream, found[-1], options, as_json)
     frames = counted(sum(map(len, found)), "frame")
     log.info("%s: %s, %s", out, counted(len(found), "sequence"), frames)
     return found
+
+
+def _write(
+    folder: Path, decoder: SequenceDecoder, stream: WordStream, beliefs: Beliefs, options: Decoding, as_json: bool
+) -> None:
+    suffix = "jsonl" if as_json else "tsv"
+    write_text(folder / f"{stream.name}.{suffix}", format_beliefs(beliefs, as_json=as_json))
+    if options.explain and isinstance(decoder, Recognizer):
+        decisions = (json.dumps(one, ensure_ascii=False) + "\n" for one in decoder.explain_stream(stream))
+        write_text(folder / f"{stream.name}{EXPLAINED}", "".join(decisions))
+
+
+def _dictionary_for(sources: Sequence[Path | str], path: Path | str) -> "DictionarySet":
+    """The dictionaries in `path`, for sources that are to be images."""
+    # Only images need OpenCV and scipy.
+    from placerec.vision import DictionarySet
+
+    for source in sources:
+        if is_stream(Path(source)):
+            raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {path} out")
+    return DictionarySet.load(path)
 
 
 def _are_images(sources: Sequence[Path | str], models: PlaceModels) -> bool:
