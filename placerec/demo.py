@@ -30,7 +30,9 @@ from placerec.page.pictures import pictures_of
 from placerec.page.report import Shown, report_page
 from placerec.page.tiles import typical_frames
 from placerec.vision import (
+    DEFAULT_KIND,
     Descriptors,
+    DescriptorSpec,
     Dictionary,
     DictionaryOptions,
     DictionarySet,
@@ -73,7 +75,8 @@ def run_demo(
             render_lab(folder / "lab", scale=scale, seed=seed, progress=show)
         sequences = find_sequences([folder / "lab"])
         with progress("describe") as show:
-            descriptors = describe(sequences, progress=show)
+            kind = "gist" if as_in_paper else DEFAULT_KIND
+            descriptors = describe(sequences, DescriptorSpec(kind=kind), progress=show)
         log.info("Learning visual words from runs 1 and 2, and translating all runs")
         training = np.array([not name.endswith(TEST_RUN) for name in descriptors.sequences])
         beliefs = {} if as_in_paper else {LEARNED: _learned(folder, descriptors, training, seed)}

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
-from placerec.experiments.comparison.benchmark import COMPARED, FrontEndCost, MethodRun
+from placerec.experiments.comparison.benchmark import COMPARED, MethodRun
 from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.results import (
     Comparison,
@@ -31,6 +31,7 @@ from placerec.experiments.comparison.results import (
     judge,
 )
 from placerec.experiments.comparison.run import SIZE, compare
+from placerec.experiments.cost import FrontEndCost
 from placerec.experiments.grid.splits import SPLITS
 from placerec.files import write_text
 from placerec.frames import find_sequences

@@ -1,35 +1,28 @@
 """`hohmm` as `placerec learn` makes it: several dictionaries, and how much their words weigh."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from time import perf_counter
 
 import numpy as np
 
+from placerec.experiments.cost import FrontEndCost, front_end_cost
 from placerec.experiments.store import WordsJob, key_of
 from placerec.files import whole_folder
 from placerec.frames.table import FrameTable
 from placerec.model import ModelOptions, PlaceModels, load_model
 from placerec.model.folder import ModelFolder, owned_by
 from placerec.model.learn import learn_folder, learn_models
-from placerec.vision import Descriptors, Dictionary, DictionarySet, DictionarySetOptions
+from placerec.vision import DictionarySet, DictionarySetOptions
 from placerec.words import WordStream
 from placerec.words.tokenize import tokens_of
-
-# Frames that the cost of the words is measured on.
-TIMED = 300
 
 
 @dataclass(frozen=True)
 class SeveralDictionaries:
-    """Models of several dictionaries, and the test sequences in their words; `microseconds`: a frame's, for all words.
-
-    The time is that from a frame's descriptor to the frame's words, one frame after the other.
-    """
+    """Models of several dictionaries, the test sequences in their words, and the cost of a frame's words."""
 
     models: PlaceModels
     tests: tuple[WordStream, ...] = field(repr=False)
-    microseconds: float
+    cost: FrontEndCost
 
 
 def learn_several(job: WordsJob, seed: int, given: DictionarySet | None = None) -> SeveralDictionaries:
@@ -48,19 +41,9 @@ def learn_several(job: WordsJob, seed: int, given: DictionarySet | None = None) 
             if given is None:
                 learn_folder(ModelFolder(folder), values, table, training[0].spec, options, ModelOptions())
             else:
-                learn_models(ModelFolder(folder), values, table, given, ModelOptions())
+                learn_models(ModelFolder(folder), values, table, training[0].spec, given, ModelOptions())
     models = load_model(path)
     dictionaries = DictionarySet.load(models.folder.words)
     tests = [one.load() for one in job.test]
     streams = tuple(stream for found in tests for stream in tokens_of(found, dictionaries))
-    return SeveralDictionaries(models, streams, microseconds_of_words(dictionaries, tests))
-
-
-def microseconds_of_words(dictionaries: Dictionary | DictionarySet, described: Sequence[Descriptors]) -> float:
-    """How long a descriptor takes to become words, one after the other, the mean over the first TIMED."""
-    rows = [row[None] for row in np.concatenate([one.values for one in described])[:TIMED]]
-    dictionaries.words(rows[0])
-    started = perf_counter()
-    for row in rows:
-        dictionaries.words(row)
-    return 1e6 * (perf_counter() - started) / len(rows)
+    return SeveralDictionaries(models, streams, front_end_cost(job, tests, dictionaries))

@@ -67,7 +67,7 @@ def learn_model(
             found = describe(sequences, spec, matrix=matrix)
             spec, values, table = found.spec, found.values, found.table
         else:
-            spec = spec or DescriptorSpec()
+            spec = spec or DescriptorSpec(kind=words.kind())
             kept = keep_described(sequences, spec, journal, work, cache, progress)
             values, table = kept.values.pieces, kept.table
         return learn_folder(ModelFolder(path), values, table, spec, words, options, work)
@@ -91,13 +91,14 @@ def learn_folder(
     names = tuple(table.by_sequence())
     made = DictionarySet(tuple(replace(one, sequences=names) for one in made.dictionaries))
     weigh = partial(learn_weights_anew, values, table, spec, made.options, options, work)
-    return learn_models(folder, values, table, made, options, weigh)
+    return learn_models(folder, values, table, spec, made, options, weigh)
 
 
 def learn_models(
     folder: ModelFolder,
     values: Source,
     table: FrameTable,
+    spec: DescriptorSpec,
     dictionaries: DictionarySet,
     options: ModelOptions,
     weigh: Callable[[], Weights] | None = None,
@@ -106,7 +107,7 @@ def learn_models(
     dictionaries.save(folder.words)
     tokens = folder.path / TOKENS
     tokens.mkdir()
-    fill_folder(streams_of_rows(values, table, dictionaries), dictionaries, tokens)
+    fill_folder(streams_of_rows(values, table, dictionaries, spec), dictionaries, tokens)
     records = train_folder(folder, [tokens], options)
     return learn_evidence(folder, records, [tokens], options, weigh)
 
@@ -137,8 +138,8 @@ def learn_weights_anew(
             with _unsaid():
                 made = DictionarySet.fit(training, spec=spec, places=others.places, options=words, work=work)
             vocabularies = {one.name: one.vocabulary for one in made.dictionaries}
-            counts = count_places(streams_of_rows(training, others, made), vocabularies, options)
-            streams = streams_of_rows(some_rows(values, left), table.take(left), made)
+            counts = count_places(streams_of_rows(training, others, made, spec), vocabularies, options)
+            streams = streams_of_rows(some_rows(values, left), table.take(left), made, spec)
             yield from held_out(counts, streams, vocabularies, options)
 
     return chosen(held(), dictionaries)
@@ -172,4 +173,7 @@ def weigher(
     values, kept = read_rows(Path(descriptors), list(zip(table.sequences, table.names, strict=True)))
     if len(kept) < len(table):
         raise VisionError(f"{descriptors}: has rows for {len(kept)} of the {len(table)} frames; describe all of them")
+    if values.shape[1] != made.spec.length:
+        wanted = f"and those of {words} have {made.spec.length}; describe with --descriptor {made.spec.kind}"
+        raise VisionError(f"{descriptors}: has descriptors of {values.shape[1]} values, {wanted}")
     return partial(learn_weights_anew, values, table, made.spec, made.options, options)

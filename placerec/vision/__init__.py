@@ -11,6 +11,7 @@ from placerec.vision.dictionary_set import DictionarySet as DictionarySet
 from placerec.vision.gist import gist as gist
 from placerec.vision.images import fit_image as fit_image
 from placerec.vision.options import (
+    DEFAULT_KIND as DEFAULT_KIND,
     DictionaryOptions as DictionaryOptions,
     DictionarySetOptions as DictionarySetOptions,
 )

@@ -3,7 +3,7 @@
 import logging
 import re
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,7 @@ class Dictionary:
     """PCA + map: codebook float32 (K, k) and hits int64 (K,), the training frames per unit, row-major on the map.
 
     `sequences`: the names of the recordings that it was learnt from, as far as they are known. `name`: what a
-    `DictionarySet` calls it, no part of a file of one.
+    `DictionarySet` calls it, and `view`: the view of it (`options.View`), no part of a file of one.
     """
 
     spec: DescriptorSpec
@@ -57,6 +57,7 @@ class Dictionary:
     sequences: tuple[str, ...] = ()
     _: KW_ONLY
     name: str = ""
+    view: str = "plain"
 
     @classmethod
     def fit(
@@ -136,7 +137,7 @@ class Dictionary:
 
     def save(self, path: Path | str) -> None:
         """Write words.npz: arrays and a JSON string `meta`, no pickle; the same dictionary gives the same bytes."""
-        write_dictionaries(Path(path), (self,))
+        write_dictionaries(Path(path), (self,), self.spec)
 
     @classmethod
     def load(cls, path: Path | str) -> "Dictionary":
@@ -174,30 +175,34 @@ def words_in(
 def rows_to_look_up(descriptors: Singles | Descriptors, spec: DescriptorSpec) -> Singles:
     """The descriptors as float32 (n, d); VisionError for unusable ones and for `Descriptors` of another kind."""
     if isinstance(descriptors, Descriptors):
-        if descriptors.spec != spec:
+        try:
+            columns = descriptors.spec.columns_of(spec)
+        except VisionError as error:
             raise VisionError(
                 f"the descriptors are of another kind ({descriptors.spec}) than the dictionary's ({spec}); "
                 "describe the images with the dictionary's"
-            )
-        descriptors = descriptors.values
+            ) from error
+        descriptors = descriptors.values[:, columns]
     return checked_rows(descriptors, spec)
 
 
-def write_dictionaries(path: Path, dictionaries: tuple[Dictionary, ...]) -> None:
+def write_dictionaries(path: Path, dictionaries: tuple[Dictionary, ...], spec: DescriptorSpec) -> None:
     """Write words.npz of one dictionary, or of several: arrays of the first under plain names, others' as `hits.NAME`.
 
     A projection that several share is written once; `components.VIEW` is that of the first one named VIEW and a number.
+    `spec`: the descriptors of all dictionaries, joined.
     """
     first = dictionaries[0]
-    meta = {
+    meta: dict[str, Any] = {
         "format": FORMAT,
         "version": ONE,
         "placerec": __version__,
-        "descriptor": first.spec.as_dict(),
+        "descriptor": spec.as_dict(),
         "sequences": list(first.sequences),
     }
     arrays = first._arrays()
     if len(dictionaries) == 1:
+        meta |= {} if first.view == "plain" else {"view": first.view}
         write_npz(path, arrays, {**meta, "training": asdict(first.training), "quality": asdict(first.quality)})
         return
     views = {id(first.pca): ""}
@@ -205,8 +210,10 @@ def write_dictionaries(path: Path, dictionaries: tuple[Dictionary, ...]) -> None
     for one in dictionaries:
         view = views.setdefault(id(one.pca), view_of(one.name))
         arrays |= _named(_of_pca(one.pca), view) | _named({"codebook": one.codebook, "hits": one.hits}, one.name)
-        told = {"training": asdict(one.training), "quality": asdict(one.quality)}
-        members.append({"name": one.name, "projection": view, **told})
+        told: dict[str, Any] = {"training": asdict(one.training), "quality": asdict(one.quality)}
+        if one.spec != spec:
+            told["descriptor"] = one.spec.kind
+        members.append({"name": one.name, "view": one.view, "projection": view, **told})
     write_npz(path, arrays, {**meta, "version": SEVERAL, "dictionaries": members})
 
 
@@ -239,6 +246,8 @@ class _Member:
     """What `meta` tells of a dictionary of the file."""
 
     name: str
+    view: str
+    spec: DescriptorSpec
     projection: str
     training: DictionaryOptions
     quality: Quality
@@ -258,10 +267,14 @@ def _members(meta: dict[str, Any]) -> list[_Member]:
     if meta.get("version") not in (ONE, SEVERAL):
         raise VisionError(f"it has format version {meta.get('version')}, and this placerec reads {ONE} and {SEVERAL}")
     try:
-        told = meta["dictionaries"] if meta["version"] == SEVERAL else [{"name": "", "projection": "", **meta}]
+        spec = DescriptorSpec(**meta["descriptor"])
+        alone = {"name": "", "view": "plain", "projection": "", **meta, "descriptor": spec.kind}
+        told = meta["dictionaries"] if meta["version"] == SEVERAL else [alone]
         members = [
             _Member(
                 str(one["name"]),
+                str(one["view"]),
+                spec.part(*str(one.get("descriptor", spec.kind)).split("+")),
                 str(one["projection"]),
                 DictionaryOptions(**one["training"]),
                 Quality(**one["quality"]),
@@ -295,22 +308,22 @@ def _more_arrays(meta: dict[str, Any]) -> list[str]:
 def _restored(arrays: Arrays, meta: dict[str, Any]) -> tuple[Dictionary, ...]:
     members = _members(meta)
     try:
-        spec = DescriptorSpec(**meta["descriptor"])
         sequences = tuple(map(str, meta.get("sequences", ())))
-    except (KeyError, TypeError) as error:
+    except TypeError as error:
         raise VisionError(f"its meta is incomplete ({error})") from error
     projections: dict[str, Pca] = {}
     dictionaries = []
     for member in members:
         names = member.arrays()
         mine = {name: arrays[stored] for name, stored in names.items()}
-        lengths = {"d": spec.length, "k": mine["variances"].size, "K": member.training.size**2}
+        lengths = {"d": member.spec.length, "k": mine["variances"].size, "K": member.training.size**2}
         _check_arrays(mine, lengths, names)
         quality = member.quality
         pca = Pca(mine["mean"], mine["components"], mine["variances"], quality.explained, quality.needed)
         pca = projections.setdefault(member.projection, pca)
         of_map = mine["codebook"], mine["hits"]
-        dictionaries.append(Dictionary(spec, pca, *of_map, member.training, quality, sequences, name=member.name))
+        found = Dictionary(member.spec, pca, *of_map, member.training, quality, sequences)
+        dictionaries.append(replace(found, name=member.name, view=member.view))
     return tuple(dictionaries)
 
 

@@ -1,11 +1,12 @@
-"""Several dictionaries of the same descriptors, learned together and kept in one words.npz."""
+"""Several dictionaries, of one or more views of a frame, learned together and kept in one words.npz."""
 
 import hashlib
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from placerec.arrays import Ints, Singles
 from placerec.errors import VisionError
@@ -21,30 +22,30 @@ from placerec.vision.dictionary import (
     words_in,
     write_dictionaries,
 )
-from placerec.vision.learning import TrainingRows, learn_map, training_rows, warn_of_few
+from placerec.vision.learning import TrainingRows, learn_map, some_columns, training_rows, warn_of_few
 from placerec.vision.lookup import Lookup
-from placerec.vision.options import DictionarySetOptions
-from placerec.vision.pca import Pca, fit_pca, is_orthonormal, moments, projected
+from placerec.vision.options import DictionarySetOptions, View
+from placerec.vision.pca import Pca, moments, projected
 from placerec.vision.som import EpochProgress, MapQuality
 from placerec.vision.spec import DescriptorSpec, descriptor
-from placerec.vision.views import place_normalised, place_numbers
+from placerec.vision.views import fit_blocks, place_normalised, place_numbers
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class DictionarySet:
-    """Dictionaries of one kind of descriptors; the first has no name, the others are named by view and size: `pn20`.
+    """Dictionaries of one frame's descriptors; the first has no name, others are named by view and size: `pn20`.
 
-    Raises VisionError for other names, and for dictionaries of several kinds of descriptors.
+    Raises VisionError for other names, and for dictionaries whose descriptors are made with different settings.
     """
 
     dictionaries: tuple[Dictionary, ...]
 
     def __post_init__(self) -> None:
         check_names(self.names)
-        if any(one.spec != self.spec for one in self.dictionaries):
-            raise VisionError("dictionaries of several kinds of descriptors are no set")
+        for one in self.dictionaries:
+            self.spec.columns_of(one.spec)
 
     @classmethod
     def of(cls, dictionary: "Dictionary | DictionarySet") -> "DictionarySet":
@@ -66,35 +67,30 @@ class DictionarySet:
 
         `places`: the label of each row, "" where there is none. A map of the view `plain` is the one that
         `Dictionary.fit` learns with that size and seed, which tells of `descriptors`, `progress` (called for one map
-        after the other) and `work`. Descriptors without a label train maps, but not the view `pn`, which is left out
-        with a warning where fewer than two places are labelled. Raises VisionError for unusable descriptors, and if
-        no view is left.
+        after the other) and `work`. Descriptors without a label train maps, but no view `pn`; these are left out with
+        a warning where fewer than two places are labelled. Raises VisionError for unusable descriptors, and if no view
+        is left.
         """
         rows = training_rows(descriptors, spec, options.of_map(options.sizes[0]))
-        pca = fit_pca(moments(rows.source, work), options.components)
-
-        def learned(codes: SpooledRows, pca: Pca) -> list[Dictionary]:
-            made = []
-            for of_map in map(options.of_map, options.sizes):
-                som, quality = learn_map(codes, pca, rows, of_map, progress)
-                made.append(Dictionary(spec, pca, som.codebook, som.hits, of_map, quality))
-            return made
-
-        of_view: dict[str, list[Dictionary]] = {}
-        normalised = None
-        # A fifth of the descriptors, for many passes; handed out for those of a map alone.
-        with spooled(projected(rows.source, pca), work if "plain" in options.views else None) as codes:
-            warn_of_few(codes.rows, *options.sizes)
-            if "plain" in options.views:
-                of_view["plain"] = learned(codes, pca)
-            if "pn" in options.views:
-                normalised = _normalised(pca, codes, rows, places, options, work)
-        if normalised is not None:
-            with spooled(projected(rows.source, normalised), work) as codes:
-                of_view["pn"] = learned(codes, normalised)
-        made = [(view, one) for view in options.views for one in of_view.get(view, ())]
-        others = (replace(one, name=f"{view}{one.training.size}") for view, one in made[1:])
-        return cls((made[0][1], *others))
+        views = options.views_of(spec)
+        made: dict[View, list[Dictionary]] = {}
+        missing: dict[View, str] = {}
+        for part in dict.fromkeys(view.part_of(spec) for view in views):
+            own = replace(rows, source=some_columns(rows.source, spec.columns_of(part)))
+            wanted = {view.projection: view for view in views if view.part_of(spec) == part}
+            for projection, maps in _fit_part(own, part, places, [*wanted], options, progress, work).items():
+                if isinstance(maps, str):
+                    missing[wanted[projection]] = maps
+                else:
+                    made[wanted[projection]] = maps
+        named = [
+            replace(one, view=view.told_in(spec), name=f"{view.name_in(spec)}{one.training.size}")
+            for view in views
+            for one in made.get(view, ())
+        ]
+        _tell_missing(missing, left=len(named))
+        warn_of_few(named[0].quality.used, *options.sizes)
+        return cls((replace(named[0], name=""), *named[1:]))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -111,7 +107,7 @@ class DictionarySet:
     @property
     def options(self) -> DictionarySetOptions:
         """The options that such a set is learned with."""
-        views = ["plain" if is_orthonormal(one.pca) else "pn" for one in self.dictionaries]
+        views = [one.view for one in self.dictionaries]
         training = [one.training for one in self.dictionaries]
         rest = asdict(training[0])
         rest.pop("size")
@@ -119,10 +115,14 @@ class DictionarySet:
             tuple(dict.fromkeys(views)), tuple(dict.fromkeys(one.size for one in training)), **rest
         )
 
-    @property
+    @cached_property
     def spec(self) -> DescriptorSpec:
-        """What the descriptors are."""
-        return self.dictionaries[0].spec
+        """What a frame's descriptor is: those of all dictionaries, joined in the order of the dictionaries."""
+        settings: dict[str, Any] = {}
+        for one in self.dictionaries:
+            settings |= one.spec.as_dict()
+        kinds = dict.fromkeys(kind for one in self.dictionaries for kind in one.spec.kinds)
+        return DescriptorSpec(**{**settings, "kind": "+".join(kinds)})
 
     @property
     def sequences(self) -> tuple[str, ...]:
@@ -139,28 +139,39 @@ class DictionarySet:
 
     def words(self, descriptors: Singles | Descriptors) -> tuple[tuple[Ints, Singles], ...]:
         """For every dictionary the units int64 (n,) and distances float32 (n,) that `Dictionary.words` gives."""
-        return words_in(self.dictionaries, rows_to_look_up(descriptors, self.spec), self._lookup)
+        rows = rows_to_look_up(descriptors, self.spec)
+        found: dict[str, tuple[Ints, Singles]] = {}
+        for columns, dictionaries, lookup in self._parts:
+            answers = words_in(dictionaries, rows[:, columns], lookup)
+            found |= zip((one.name for one in dictionaries), answers, strict=True)
+        return tuple(found[name] for name in self.names)
 
     def words_of(self, image: Gray) -> tuple[tuple[str, ...], tuple[float, ...]]:
         """The words of one grey image (h, w) of 0..255, one for every dictionary, and the distances from their units.
 
         Raises VisionError for an image that cannot be used.
         """
-        found = words_in(self.dictionaries, descriptor(image, self.spec)[None], self._lookup)
+        found = self.words(descriptor(image, self.spec)[None])
         words = (one.vocabulary[int(units[0])] for one, (units, _) in zip(self.dictionaries, found, strict=True))
         return tuple(words), tuple(float(distances[0]) for _, distances in found)
 
     def quality_of(self, descriptors: Singles | Descriptors) -> tuple[MapQuality, ...]:
         """How well each map represents these frames, for instance of recordings that trained nothing."""
-        return tuple(one.quality_of(descriptors) for one in self.dictionaries)
+        rows = rows_to_look_up(descriptors, self.spec)
+        return tuple(one.quality_of(rows[:, self.spec.columns_of(one.spec)]) for one in self.dictionaries)
 
     @cached_property
-    def _lookup(self) -> Lookup | None:
-        return Lookup.of([(one.pca, one.units) for one in self.dictionaries])
+    def _parts(self) -> tuple[tuple[slice | list[int], tuple[Dictionary, ...], Lookup | None], ...]:
+        """The columns of each kind of descriptors, its dictionaries, and what is known of these for one row."""
+        parts = []
+        for spec in dict.fromkeys(one.spec for one in self.dictionaries):
+            own = tuple(one for one in self.dictionaries if one.spec == spec)
+            parts.append((self.spec.columns_of(spec), own, Lookup.of([(one.pca, one.units) for one in own])))
+        return tuple(parts)
 
     def save(self, path: Path | str) -> None:
         """Write words.npz; a set of one dictionary is the file that `Dictionary.save` writes."""
-        write_dictionaries(Path(path), self.dictionaries)
+        write_dictionaries(Path(path), self.dictionaries, self.spec)
 
     @classmethod
     def load(cls, path: Path | str) -> "DictionarySet":
@@ -168,22 +179,57 @@ class DictionarySet:
         return cls(read_dictionaries(Path(path)))
 
 
-def _normalised(
-    pca: Pca,
-    codes: SpooledRows,
+def _fit_part(
     rows: TrainingRows,
+    spec: DescriptorSpec,
     places: Sequence[str] | None,
+    projections: Iterable[str],
     options: DictionarySetOptions,
+    progress: EpochProgress | None,
     work: Executor | None,
-) -> Pca | None:
-    """The place-normalised projection; None, and a warning, if the labels do not give one and another view is left."""
+) -> dict[str, list[Dictionary] | str]:
+    """For every projection of some descriptors the dictionaries of all sizes, or why it cannot be learned."""
+    pca = fit_blocks(moments(rows.source, work), spec.lengths, options.components)
+
+    def learned(codes: SpooledRows, pca: Pca) -> list[Dictionary]:
+        made = []
+        for of_map in map(options.of_map, options.sizes):
+            som, quality = learn_map(codes, pca, rows, of_map, progress)
+            made.append(Dictionary(spec, pca, som.codebook, som.hits, of_map, quality))
+        return made
+
+    of_projection: dict[str, list[Dictionary] | str] = {}
+    normalised: Pca | str = ""
+    # A fifth of the descriptors, for many passes; handed out for those of a map alone.
+    with spooled(projected(rows.source, pca), work if "plain" in projections else None) as codes:
+        if "plain" in projections:
+            of_projection["plain"] = learned(codes, pca)
+        if "pn" in projections:
+            normalised = _normalised(pca, codes, rows, places, work)
+    if isinstance(normalised, Pca):
+        with spooled(projected(rows.source, normalised), work) as codes:
+            of_projection["pn"] = learned(codes, normalised)
+    elif normalised:
+        of_projection["pn"] = normalised
+    return of_projection
+
+
+def _normalised(
+    pca: Pca, codes: SpooledRows, rows: TrainingRows, places: Sequence[str] | None, work: Executor | None
+) -> Pca | str:
+    """The place-normalised projection, or why the labels do not give one."""
     numbers = place_numbers(places, codes.rows if rows.kept is None else len(rows.kept))
     try:
         return place_normalised(pca, codes, numbers if rows.kept is None else numbers[rows.kept], work)
     except VisionError as error:
-        if options.views == ("pn",):
-            raise VisionError(
-                f"the view pn cannot be learned: {error}; label more frames, or choose --views plain"
-            ) from error
-        log.warning("the view pn is left out: %s", error)
-        return None
+        return str(error)
+
+
+def _tell_missing(missing: Mapping[View, str], left: int) -> None:
+    """A warning of the views that cannot be learned; VisionError if none of the dictionaries is `left`."""
+    if missing:
+        told = f"the view{'s' * (len(missing) > 1)} {', '.join(map(str, missing))}"
+        why = next(iter(missing.values()))
+        if not left:
+            raise VisionError(f"{told} cannot be learned: {why}; label more frames, or choose --views plain")
+        log.warning("%s %s left out: %s", told, "are" if len(missing) > 1 else "is", why)

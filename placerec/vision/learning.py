@@ -116,6 +116,13 @@ def checked_rows(descriptors: Singles, spec: DescriptorSpec, first: int = 0) -> 
     return rows
 
 
+def some_columns(source: Source, columns: slice | list[int]) -> Source:
+    """Some columns of the rows of a source; the source as it is if they are all."""
+    if columns == slice(None):
+        return source
+    return lambda: (np.ascontiguousarray(rows[:, columns]) for rows in chunks(source))
+
+
 def some_rows(source: Source, kept: Mask) -> Stream:
     """Some rows of a source, in their order."""
 

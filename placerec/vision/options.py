@@ -7,10 +7,61 @@ import numpy as np
 
 from placerec.errors import VisionError
 from placerec.vision.som import RULES, WIDTH, Rule
+from placerec.vision.spec import KINDS, DescriptorSpec
 
 Units = Literal["live", "all"]
 UNITS: tuple[str, ...] = get_args(Units)
-VIEWS = ("plain", "pn")
+PROJECTIONS = ("plain", "pn")
+# What words are made of by default, with the views of `View.default`: docs/vision.md has what each is worth.
+DEFAULT_KIND = "gist+lbp+ranks"
+
+
+@dataclass(frozen=True)
+class View:
+    """A way of looking at a frame: the descriptors of some `kinds`, () for all there are, and a projection of them."""
+
+    kinds: tuple[str, ...]
+    projection: str
+
+    @classmethod
+    def parse(cls, text: str) -> "View":
+        """A view from `plain`, `pn`, `KIND`, `KIND:pn` or `KIND+KIND:pn`; VisionError for anything else."""
+        if text in PROJECTIONS:
+            return cls((), text)
+        kinds, colon, projection = text.partition(":")
+        for kind in kinds.split("+"):
+            if kind not in KINDS:
+                known = ", ".join((*PROJECTIONS, *KINDS))
+                raise VisionError(
+                    f"no view is called {text!r}; choose some of {known}, as in gist, gist:pn, gist+lbp:pn"
+                )
+        if colon and projection not in PROJECTIONS:
+            raise VisionError(f"{text!r}: no projection is called {projection!r}; choose plain or pn")
+        return cls(tuple(kinds.split("+")), projection or "plain")
+
+    @classmethod
+    def default(cls, spec: DescriptorSpec) -> tuple["View", ...]:
+        """The views of descriptors where none are named: the first kind as it is, then each kind place-normalised."""
+        return tuple(
+            cls((), projection) if len(spec.kinds) == 1 else cls((kind,), projection)
+            for kind, projection in ((spec.kinds[0], "plain"), *((kind, "pn") for kind in spec.kinds))
+        )
+
+    def part_of(self, spec: DescriptorSpec) -> DescriptorSpec:
+        """The descriptors that are looked at; VisionError if they are no part of those of `spec`."""
+        return spec.part(*self.kinds) if self.kinds else spec
+
+    def name_in(self, spec: DescriptorSpec) -> str:
+        """What dictionaries of this view are named by: `pn`, and with other kinds beside, `gist` or `lbppn`."""
+        return self.told_in(spec).replace("+", "").replace(":", "")
+
+    def told_in(self, spec: DescriptorSpec) -> str:
+        """The view in words, without the kinds where they are all there are: `pn`, `gist`, `gist+lbp:pn`."""
+        return self.projection if self.kinds == spec.kinds else str(self)
+
+    def __str__(self) -> str:
+        kinds = "+".join(self.kinds)
+        return self.projection if not kinds else kinds if self.projection == "plain" else f"{kinds}:{self.projection}"
 
 
 @dataclass(frozen=True)
@@ -52,12 +103,13 @@ class DictionaryOptions:
 class DictionarySetOptions:
     """How a set of dictionaries is learned: one for every view and size, the views outermost.
 
-    `views`: `plain`, the principal components, and `pn`, place-normalised (`views.place_normalised`). `sizes`: the
-    sides of the maps. The other options are those of `DictionaryOptions`, and every map's. Raises VisionError for a
-    value that cannot be used.
+    `views`: descriptors and projection of each, as `View.parse` reads them: `gist`, `gist:pn`, `gist+lbp:pn`; without
+    a kind (`plain`, `pn`) of all descriptors there are; () for those of `View.default`. `plain` are the principal
+    components, `pn` these place-normalised (`views.place_normalised`). `sizes`: the sides of the maps. The other
+    options are those of `DictionaryOptions`, and every map's. Raises VisionError for a value that cannot be used.
     """
 
-    views: tuple[str, ...] = VIEWS
+    views: tuple[str, ...] = ()
     sizes: tuple[int, ...] = (10, 20)
     components: int = 80
     seed: int = 0
@@ -68,15 +120,14 @@ class DictionarySetOptions:
     width: float = WIDTH
 
     def __post_init__(self) -> None:
+        if not self.sizes:
+            raise VisionError("no sizes are given; name at least one")
         for name in ("views", "sizes"):
             values = getattr(self, name)
-            if not values:
-                raise VisionError(f"no {name} are given; name at least one")
             if len(set(values)) < len(values):
                 raise VisionError(f"{name} {','.join(map(str, values))} name one twice; leave it out")
         for view in self.views:
-            if view not in VIEWS:
-                raise VisionError(f"no view is called {view!r}; choose some of {', '.join(VIEWS)}")
+            View.parse(view)
         for size in self.sizes:
             self.of_map(size)
 
@@ -92,3 +143,19 @@ class DictionarySetOptions:
         """The options of the maps of one size."""
         every = {name: value for name, value in asdict(self).items() if name not in ("views", "sizes")}
         return DictionaryOptions(size, **every)
+
+    def views_of(self, spec: DescriptorSpec) -> tuple[View, ...]:
+        """The views of descriptors of `spec`; VisionError if one needs others, or if two are one."""
+        views = tuple(map(View.parse, self.views)) or View.default(spec)
+        for number, view in enumerate(views):
+            part = view.part_of(spec), view.projection
+            if part in [(other.part_of(spec), other.projection) for other in views[:number]]:
+                raise VisionError(f"the view {view} of {spec.kind} descriptors is named twice; leave it out")
+        return views
+
+    def kind(self) -> str:
+        """The kinds of descriptors that the views need, joined, where nothing else says which: `DEFAULT_KIND`, or GIST
+        for views without a kind."""
+        if not self.views:
+            return DEFAULT_KIND
+        return "+".join(dict.fromkeys(kind for view in self.views for kind in View.parse(view).kinds)) or "gist"

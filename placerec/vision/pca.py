@@ -113,12 +113,6 @@ def with_signs(components: Floats) -> Floats:
     return signed
 
 
-def is_orthonormal(pca: Pca) -> bool:
-    """Whether the components are principal ones, and not a projection that weighs directions."""
-    products = np.einsum("id,jd->ij", pca.components.astype(np.float64), pca.components.astype(np.float64))
-    return bool(np.abs(products - np.eye(len(products))).max() < 1e-3)
-
-
 def project(rows: Singles, pca: Pca) -> Singles:
     """Coordinates float32 (n, k) of rows (n, d); a row's do not depend on the other rows."""
     codes = np.empty((len(rows), len(pca.components)), np.float32)

@@ -76,6 +76,9 @@ def train_dictionary(
         seen, unseen = (
             sum(len(one.frames) for one in some) if isinstance(some, list) else 0 for some in (training, others)
         )
+        options = DictionarySetOptions.of(options)
+        if isinstance(training, list) and matrix is None:
+            spec = spec or DescriptorSpec(kind=options.kind())
         tell = progress or (lambda done, total: None)
         shown = partial(_described, matrix=matrix, work=work, cache=cache)
         found = shown(training, spec, progress=lambda done, _: tell(done, seen + unseen), journal=journal)
@@ -83,7 +86,7 @@ def train_dictionary(
             found.values if isinstance(found, Descriptors) else found.values.pieces,
             spec=found.spec,
             places=found.table.places,
-            options=DictionarySetOptions.of(options),
+            options=options,
             work=work,
         )
         names = tuple(found.table.by_sequence())

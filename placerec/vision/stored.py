@@ -44,7 +44,7 @@ def read_descriptors(sources: Iterable[Path | str], spec: DescriptorSpec | None 
         try:
             parts.append(_read(path))
             kind = spec or parts[0].spec
-            if parts[-1].spec != kind:
+            if not parts[-1].spec.holds(kind) or parts[-1].spec != parts[0].spec:
                 raise VisionError(
                     f"holds {_told(parts[-1].spec)}, and {_told(kind)} are wanted; describe the images so"
                 )

@@ -17,7 +17,7 @@ from placerec.frames.table import Labels
 from placerec.jobs import Executor, remote_or_local_map
 from placerec.vision import exact
 from placerec.vision.chunks import SpooledRows, check_again, chunks
-from placerec.vision.pca import Pca, with_signs
+from placerec.vision.pca import Moments, Pca, fit_pca, with_signs
 from placerec.vision.som import group_sums
 
 log = logging.getLogger(__name__)
@@ -65,6 +65,27 @@ class Scatter:
         return float(np.trace(self.covariance)) / len(self.scatter)
 
 
+def fit_blocks(data: Moments, lengths: Sequence[int], components: int) -> Pca:
+    """The PCA of rows whose columns are blocks of `lengths`, each divided by the root of its total variance.
+
+    One block is left as it is, and the components are orthonormal then; otherwise they hold the blocks' factors, so
+    that rows are projected as they are. Raises VisionError as `fit_pca` does.
+    """
+    if len(lengths) == 1:
+        return fit_pca(data, components)
+    ends = np.cumsum(lengths)[:-1]
+    totals = np.array([block.sum() for block in np.split(np.diag(data.scatter), ends)]) / max(data.n - 1, 1)
+    factors = np.repeat(1 / np.sqrt(np.where(totals > 0, totals, 1)), lengths)
+    found = fit_pca(Moments(data.n, data.mean * factors, data.scatter * np.outer(factors, factors)), components)
+    return replace(found, mean=data.mean, components=_as_stored(found.components * factors))
+
+
+def _as_stored(components: Floats) -> Singles:
+    """The components (k, d) float32, on the grid that makes a projection independent of the order of its sums."""
+    exponents = exact.exponents(components)
+    return np.ldexp(exact.on_grid(np.ldexp(components, -exponents)), exponents).astype(np.float32)
+
+
 def place_numbers(places: Sequence[str] | None, n: int) -> Ints:
     """The number of each row's place in the order of names, -1 for none; VisionError unless there are n."""
     if places is None:
@@ -97,9 +118,7 @@ def place_normalised(pca: Pca, codes: SpooledRows, places: Ints, work: Executor 
     variances, turn = exact.eigen(np.einsum("ik,k,jk->ij", white, pca.variances.astype(np.float64), white))
     turned = np.einsum("ij,jk->ik", turn, white)
     components = with_signs(np.einsum("ik,kd->id", turned, pca.components.astype(np.float64)))
-    exponents = exact.exponents(components)
-    components = np.ldexp(exact.on_grid(np.ldexp(components, -exponents)), exponents)
-    return replace(pca, components=components.astype(np.float32), variances=variances.astype(np.float32))
+    return replace(pca, components=_as_stored(components), variances=variances.astype(np.float32))
 
 
 def place_scatter(codes: SpooledRows, places: Ints, work: Executor | None = None) -> Scatter:

@@ -81,18 +81,18 @@ def tokens_of(descriptors: Descriptors, dictionary: Dictionary | DictionarySet) 
 
 
 def streams_of_rows(
-    values: Source, table: FrameTable, dictionaries: DictionarySet, spec: DescriptorSpec | None = None
+    values: Source, table: FrameTable, dictionaries: DictionarySet, spec: DescriptorSpec
 ) -> list[WordStream]:
     """The token streams of the frames in `table`, one per sequence, given their descriptors, in memory or streamed.
 
-    `spec`: of the descriptors; VisionError if it is another than that of the dictionaries.
+    `spec`: of the descriptors, among which those of the dictionaries must be; VisionError otherwise.
     """
     pieces: dict[str, list[WordStream]] = {}
     first = 0
     for rows in chunks(values):
         part = table.take(slice(first, first + len(rows)))
         first += len(rows)
-        found = dictionaries.words(rows if spec is None else Descriptors(spec, rows, part))
+        found = dictionaries.words(Descriptors(spec, rows, part))
         for name, own in part.by_sequence().items():
             words = [(units[own], far[own]) for units, far in found]
             pieces.setdefault(name, []).append(_stream(part.take(own), dictionaries, words))
@@ -128,7 +128,7 @@ def _parts(
     """Pieces of the token streams, those of a sequence one after the other."""
     sequences = open_sources(sources, source_options, dictionaries.spec, matrix, endless=True)
     if isinstance(sequences, KeptDescriptors):
-        yield from streams_of_rows(sequences.values.pieces, sequences.table, dictionaries)
+        yield from streams_of_rows(sequences.values.pieces, sequences.table, dictionaries, sequences.spec)
         return
     names = set()
     if matrix is not None:

@@ -6,9 +6,9 @@ import pytest
 from helpers.pictures import drawn_texts
 
 from placerec.evaluation.bootstrap import Pair
-from placerec.experiments.comparison.benchmark import FrontEndCost
 from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.results import Comparison, MethodScore
+from placerec.experiments.cost import FrontEndCost
 
 pytest.importorskip("matplotlib")
 MARKED = "the best, or cannot be told from it"

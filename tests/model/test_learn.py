@@ -12,7 +12,13 @@ from placerec.learning import format_learned
 from placerec.methods import decode
 from placerec.model import ModelOptions, load_model, train_lm
 from placerec.model.learn import weigher
-from placerec.vision import DictionarySetOptions, describe_sources, train_dictionary
+from placerec.vision import (
+    DEFAULT_KIND,
+    DescriptorSpec,
+    DictionarySetOptions,
+    describe_sources,
+    train_dictionary,
+)
 from placerec.words.tokenize import tokenize
 
 WORDS = DictionarySetOptions(sizes=(2, 3), components=6)
@@ -29,7 +35,8 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def test_it_writes_what_the_single_commands_write(tmp_path: Path, runs: list[Path]) -> None:
     learn(runs[:3], tmp_path / "model", words=WORDS)
-    describe_sources(runs[:3], tmp_path / "descriptors.npz")
+    described = DescriptorSpec(kind=DEFAULT_KIND)
+    describe_sources(runs[:3], tmp_path / "descriptors.npz", spec=described)
     train_dictionary(runs[:3], tmp_path / "words.npz", options=WORDS)
     tokenize(runs[:3], tmp_path / "words.npz", tmp_path / "tokens")
     weigh = weigher([tmp_path / "tokens"], tmp_path / "words.npz", tmp_path / "descriptors.npz", ModelOptions())

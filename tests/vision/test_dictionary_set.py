@@ -148,7 +148,7 @@ def test_what_is_no_set_is_refused(several: DictionarySet) -> None:
         ((first, first), "a dictionary cannot be called ''; small letters and a number are a name"),
         ((first, replace(other, name="../x1")), "a dictionary cannot be called '../x1'"),
         ((first, other, other), "two dictionaries are called plain5"),
-        ((first, classic), "dictionaries of several kinds of descriptors are no set"),
+        ((first, classic), "gist descriptors are no part of gist descriptors with these settings"),
     ]
     for dictionaries, message in cases:
         with pytest.raises(VisionError, match=f"^{message}"):

@@ -122,7 +122,10 @@ def test_the_papers_words_are_a_preset_and_what_is_given_wins(tmp_path: Path) ->
 
 def test_views_and_sizes_that_do_not_exist_are_refused(tmp_path: Path) -> None:
     for options, message in (
-        (("--views", "plain,lda"), "Invalid value for '--views': 'lda' is not one of 'plain', 'pn';"),
+        (
+            ("--views", "plain,lda"),
+            "Invalid value for '--views': no view is called 'lda'; choose some of plain, pn",
+        ),
         (("--views", "pn,pn"), "Invalid value for '--views': pn is named twice"),
         (("--sizes", "10,1"), "Invalid value for '--size' / '--sizes': 1 is not in the range 2<=x<=200;"),
         (("--size", "10,,20"), "Invalid value for '--size' / '--sizes': '' is not a valid integer range;"),

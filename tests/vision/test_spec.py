@@ -39,7 +39,7 @@ def test_before_there_were_kinds_all_was_gist() -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"kind": "sift"}, "no descriptor is called 'sift'; choose one of gist, centrist, npy"),
+        ({"kind": "sift"}, "no descriptor is called 'sift'; choose one of gist, lbp, ranks, centrist, npy"),
         ({"kind": []}, "no descriptor is called []"),
         ({"variant": "new"}, "no GIST variant is called 'new'; choose one of lmgist, classic"),
         ({"fit": "stretch"}, "no fit is called 'stretch'; choose one of squash, crop"),

@@ -11,14 +11,17 @@ from click.core import ParameterSource
 from placerec.cli.shared import groups
 from placerec.cli.shared.values import Command
 
+# Of `vision.KINDS`, which takes numpy to import.
+KINDS = ("gist", "lbp", "ranks", "centrist")
+
 
 def descriptor_option(text: str, *kinds: str) -> Callable[[Command], Command]:
-    """--descriptor: one of `kinds`, the first by default, or npy:FILE; as the kind and the file, if there is one."""
+    """--descriptor: one of `kinds`, or several joined by +, or npy:FILE; as the kind and the file, if there is one."""
 
     def parse(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[str, Path | None] | None:
         if value is None:
             return None
-        if value in kinds:
+        if {*value.split("+")} <= {*kinds}:
             return value, None
         kind, _, path = value.partition(":")
         if kind != "npy" or not path:
@@ -29,8 +32,6 @@ def descriptor_option(text: str, *kinds: str) -> Callable[[Command], Command]:
         "--descriptor",
         metavar="|".join((*kinds, "npy:FILE")),
         callback=parse,
-        default=kinds[0] if kinds else None,
-        show_default=bool(kinds),
         help=text,
     )
 
@@ -42,7 +43,9 @@ def descriptor_options(function: Command) -> Command:
     """
 
     @descriptor_option(
-        "What describes a frame; FILE: a matrix computed elsewhere, one row a frame.", "gist", "centrist"
+        "What describes a frame, or several joined by +; FILE: a matrix computed elsewhere, one row a frame.  "
+        "[default: gist, or what --views need]",
+        *KINDS,
     )
     @groups.descriptor(
         "--variant",
@@ -64,25 +67,20 @@ def descriptor_options(function: Command) -> Command:
         help="How a picture becomes a square: stretched, or its middle.",
     )
     @functools.wraps(function)
-    def described(*args: Any, descriptor: tuple[str, Path | None], **options: Any) -> Any:
-        from placerec.vision import KINDS, DescriptorSpec
+    def described(*args: Any, descriptor: tuple[str, Path | None] | None, **options: Any) -> Any:
+        from placerec.vision import DescriptorSpec
 
-        kind, matrix = descriptor
+        words = options.get("words")
+        kind, matrix = descriptor or (words.kind() if words else "gist", None)
         settings = {name: options.pop(name) for name in ("variant", "image_size", "fit")}
         context = click.get_current_context()
-        given = {
-            name
-            for name in ("descriptor", *settings)
-            if context.get_parameter_source(name) is not ParameterSource.DEFAULT
-        }
-        for name in [name for name in settings if name not in KINDS[kind].settings]:
-            if name in given:
-                raise click.UsageError(
-                    f"--{name.replace('_', '-')} says nothing about {kind} descriptors; leave it out"
-                )
-            del settings[name]
+        given = {name for name in settings if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
+        known = () if matrix else DescriptorSpec(kind=kind).settings
+        for name in given.difference(known):
+            raise click.UsageError(f"--{name.replace('_', '-')} says nothing about {kind} descriptors; leave it out")
         # What nobody asked for is the default, or what a file of descriptors holds.
-        spec = DescriptorSpec(kind=kind, **settings) if given and not matrix else None
+        asked = (descriptor or given) and not matrix
+        spec = DescriptorSpec(kind=kind, **{name: settings[name] for name in known}) if asked else None
         return function(*args, spec=spec, matrix=matrix, **options)
 
     return described

@@ -10,15 +10,32 @@ from placerec.cli.shared.common import seed_option
 from placerec.cli.shared.values import Command, FiniteRange, listed
 
 
+def _views(ctx: click.Context, param: click.Parameter, value: str) -> tuple[str, ...]:
+    if not value:
+        return ()
+    from placerec.errors import VisionError
+    from placerec.vision.options import View
+
+    views = listed(click.STRING)(ctx, param, value)
+    for view in views:
+        try:
+            View.parse(view)
+        except VisionError as error:
+            raise click.BadParameter(str(error), ctx, param) from error
+    return views
+
+
 def dictionary_options(function: Command) -> Command:
     """--views, --size and what else dictionaries are learned with. The command gets `words`, the options."""
 
     @groups.word(
         "--views",
         metavar="VIEW,...",
-        callback=listed(click.Choice(["plain", "pn"])),
-        default="plain,pn",
-        help="What maps see: principal components (plain), or these by how little the frames of one place differ (pn).",
+        callback=_views,
+        default="",
+        help="What maps see: KIND, the principal components of such descriptors, or KIND:pn, these by how little the "
+        "frames of one place differ; KIND+KIND for several together, plain and pn for all there are.  "
+        "[default: gist,gist:pn,lbp:pn,ranks:pn]",
     )
     @groups.word(
         "--size",

@@ -4,8 +4,8 @@ A method is added in COMPARED alone: how it is fitted and run, what it is made o
 """
 
 import math
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 
 from placerec.arrays import Floats, Ints, Singles
-from placerec.errors import EvaluationError, SourceError, VisionError
-from placerec.experiments.several import SeveralDictionaries, microseconds_of_words
-from placerec.experiments.store import WordsJob, key_of, load, save
-from placerec.frames import Sequence as FrameSequence, images_at
-from placerec.frames.sequence import Gray, gray_levels
+from placerec.errors import EvaluationError, VisionError
+from placerec.experiments.cost import FrontEndCost, front_end_cost
+from placerec.experiments.several import SeveralDictionaries
+from placerec.experiments.store import WordsJob, key_of
 from placerec.frames.table import Labels
 from placerec.hohmm import Beliefs, Recognizer, SequenceDecoder, learned_transition
 from placerec.hohmm.weights import shares_of
@@ -42,16 +41,14 @@ from placerec.methods.tables import PairEmissions
 from placerec.model import Decoding, ModelOptions, PlaceModels, load_model, train_model, transition_of
 from placerec.model.decoding import TransitionName
 from placerec.model.record import record_streams
-from placerec.vision import Descriptors, Dictionary, descriptor
+from placerec.vision import Dictionary
 from placerec.vision.chunks import spooled
-from placerec.vision.options import VIEWS
+from placerec.vision.options import PROJECTIONS
 from placerec.vision.pca import project
 from placerec.vision.views import place_normalised, place_numbers
 from placerec.words import Selection, WordStream, place_steps, sentences_per_place
 from placerec.words.tokenize import tokens_of
 
-# Images that the cost of the front end is measured on.
-TIMED = 30
 # Each method is run so often over the test frames; the fastest run is told.
 RUNS = 3
 # What a method gets of a frame.
@@ -63,25 +60,14 @@ MakeStepper = Callable[[], StepFunction]
 # Chooses the options of a method of descriptors by its training and a seed: what then fits it to a training set.
 ChooseOptions = Callable[..., FitPoints]
 # The views of `vision.views` that such methods are compared on.
-PLAIN, NORMALISED = VIEWS
-
-
-@dataclass(frozen=True)
-class FrontEndCost:
-    """Microseconds that a frame takes before any method sees it: for its descriptor, and from that to its word.
-
-    `descriptor` is nan where that was computed elsewhere.
-    """
-
-    descriptor: float
-    word: float
+PLAIN, NORMALISED = PROJECTIONS
 
 
 @dataclass(frozen=True)
 class EncodedSequences:
     """All sequences through one dictionary, those of the training first.
 
-    `streams`: the words of each sequence; `points`: by view (VIEWS) the components float32 (T, k) of its T frames.
+    `streams`: the words of each sequence; `points`: by projection the components float32 (T, k) of its T frames.
     """
 
     dictionary: Dictionary
@@ -112,43 +98,7 @@ def encode(job: WordsJob, dictionary: Dictionary, views: Container[str]) -> Enco
         except VisionError as error:
             raise EvaluationError(f"no view for the methods @{NORMALISED}: {error}; leave them out") from error
         points[NORMALISED] = tuple(project(one.values, pca) for one in found)
-    return EncodedSequences(dictionary, streams, points, _cost(job, found[training:], dictionary))
-
-
-def _cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dictionary) -> FrontEndCost:
-    """The mean over some test images, one at a time; reading them is not counted."""
-    sequences = [one.sequence for one in job.test]
-    path = job.cache / "costs" / f"{key_of(dictionary.fingerprint, [s.name for s in sequences])}.json"
-    kept = load(path)
-    if kept:
-        return FrontEndCost(**kept)
-    if dictionary.spec.kind == "npy":
-        cost = FrontEndCost(math.nan, microseconds_of_words(dictionary, tests))
-    else:
-        spent = []
-        for gray in _spread_images(sequences, tests):
-            started = perf_counter()
-            row = descriptor(gray, dictionary.spec)[None]
-            described = perf_counter()
-            dictionary.words(row)
-            spent.append((described - started, perf_counter() - described))
-        cost = FrontEndCost(*(1e6 * np.mean(spent, axis=0)).tolist())
-    save(path, asdict(cost))
-    return cost
-
-
-def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descriptors]) -> Iterator[Gray]:
-    """Some images of those that have a descriptor, from all of the recordings."""
-    usable = []
-    for number, (sequence, one) in enumerate(zip(sequences, found, strict=True)):
-        names = set(one.table.names)
-        usable += [(number, k) for k, frame in enumerate(sequence.frames) if frame.name in names]
-    chosen = [usable[i] for i in np.unique(np.linspace(0, len(usable) - 1, TIMED).astype(int))]
-    for number, sequence in enumerate(sequences):
-        for image in images_at(sequence, [k for own, k in chosen if own == number]):
-            if isinstance(image, str):
-                raise SourceError(image)
-            yield gray_levels(image)
+    return EncodedSequences(dictionary, streams, points, front_end_cost(job, found[training:], dictionary))
 
 
 @dataclass(frozen=True)
@@ -284,7 +234,7 @@ def _started(decoder: SequenceDecoder) -> MakeStepper:
 
 
 def _run_several(benchmark: Benchmark) -> MethodRun:
-    """The words of all dictionaries, with what training learned; the other words' cost is added."""
+    """The words of all dictionaries, with what training learned; the cost of other descriptors and words is added."""
     several = benchmark.several
     if several is None:
         raise ValueError("hohmm needs several dictionaries")
@@ -293,7 +243,10 @@ def _run_several(benchmark: Benchmark) -> MethodRun:
         for stream in several.tests
     ]
     run = _timed(_started(make_decoder(HOHMM, several.models)), benchmark, words)
-    more = max(several.microseconds - benchmark.encoded.cost.word, 0.0)
+    one, all_ = benchmark.encoded.cost, several.cost
+    more = max(all_.word - one.word, 0.0)
+    if not math.isnan(one.descriptor):
+        more += max(all_.descriptor - one.descriptor, 0.0)
     return MethodRun(run.beliefs, run.microseconds + more)
 
 

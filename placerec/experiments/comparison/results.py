@@ -7,7 +7,8 @@ from typing import Any
 from placerec.errors import counted
 from placerec.evaluation.bootstrap import Pair, compare_pairs, count_blocks, draw, interval
 from placerec.evaluation.metrics import evaluate
-from placerec.experiments.comparison.benchmark import FrontEndCost, MethodRun
+from placerec.experiments.comparison.benchmark import MethodRun
+from placerec.experiments.cost import FrontEndCost
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,8 @@ from placerec.frames.doubts import warn_of_still_sequences, warn_of_strange_labe
 from placerec.frames.naming import own_name, unique_names
 from placerec.hohmm import read_beliefs, write_beliefs
 from placerec.jobs import ProgressBar, silent
-from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, DictionarySet
-from placerec.vision.pca import is_orthonormal
+from placerec.vision import DEFAULT_KIND, DescriptorSpec, Dictionary, DictionaryOptions, DictionarySet
+from placerec.vision.options import View
 
 # Of the dictionary that methods use, and of a second one for those that ask for it.
 SPEC, SECOND = DescriptorSpec(), DescriptorSpec(kind="centrist")
@@ -130,7 +130,7 @@ def _own_words(path: Path, described: bool) -> DictionarySet:
 
 def _plain(words: DictionarySet) -> Dictionary | None:
     """The dictionary that methods of one dictionary use."""
-    return next((one for one in words.dictionaries if is_orthonormal(one.pca)), None)
+    return next((one for one in words.dictionaries if View.parse(one.view).projection == "plain"), None)
 
 
 def _doubt(given: _Given) -> None:
@@ -155,18 +155,22 @@ def _benchmark(
         training, tests = (tuple(of[one.name] for one in part) for part in (given.training, given.tests))
         return WordsJob(training, tests, DictionaryOptions(size=size, seed=seed), cache)
 
-    spec = given.words.spec if given.words else None
+    dictionary = _plain(given.words) if given.words else None
+    spec = dictionary.spec if dictionary else None
     first = job(described(spec or SPEC) if given.matrix is None else keep_given(given.every, spec, given.matrix, cache))
     learned = {one.kept for one in first.train}
     warn_of_training([one.sequence.name for one in first.test if one.kept in learned], "words and the models")
-    dictionary = _plain(given.words) if given.words else None
     encoded = encode(first, dictionary or first.dictionary(), {COMPARED[name].view for name in methods})
     kinds = {COMPARED[name].kind for name in methods}
     second = None
     if TWO_WORDS in kinds:
         other = job(described(SECOND))
         second = encode(other, other.dictionary(), ())
-    several = learn_several(first, seed, given.words) if SEVERAL_WORDS in kinds else None
+    several = None
+    if SEVERAL_WORDS in kinds:
+        wide = given.words.spec if given.words else DescriptorSpec(kind=DEFAULT_KIND)
+        whole = first if given.matrix is not None or wide == spec else job(described(wide))
+        several = learn_several(whole, seed, given.words)
     training = len(given.training)
     return Benchmark(encoded, training, train_models(encoded, training, cache), seed, second, several)
 

@@ -1,0 +1,77 @@
+"""What a frame costs before any method sees it."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from time import perf_counter
+
+import numpy as np
+
+from placerec.errors import SourceError
+from placerec.experiments.store import WordsJob, key_of, load, save
+from placerec.frames import Sequence as FrameSequence, images_at
+from placerec.frames.sequence import Gray, gray_levels
+from placerec.vision import Descriptors, Dictionary, DictionarySet, descriptor
+
+# Images that the cost is measured on, and descriptors that it is where these were computed elsewhere.
+TIMED, MANY = 30, 300
+
+
+@dataclass(frozen=True)
+class FrontEndCost:
+    """Microseconds that a frame takes before any method sees it: for its descriptor, and from that to its word.
+
+    `descriptor` is nan where that was computed elsewhere.
+    """
+
+    descriptor: float
+    word: float
+
+
+def front_end_cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dictionary | DictionarySet) -> FrontEndCost:
+    """The mean over some test images, one at a time; reading them is not counted.
+
+    `tests`: the descriptors of the job's test sequences.
+    """
+    sequences = [one.sequence for one in job.test]
+    path = job.cache / "costs" / f"{key_of(dictionary.fingerprint, [s.name for s in sequences])}.json"
+    kept = load(path)
+    if kept:
+        return FrontEndCost(**kept)
+    if dictionary.spec.kind == "npy":
+        cost = FrontEndCost(math.nan, _microseconds_of_words(dictionary, tests))
+    else:
+        spent = []
+        for gray in _spread_images(sequences, tests):
+            started = perf_counter()
+            row = descriptor(gray, dictionary.spec)[None]
+            described = perf_counter()
+            dictionary.words(row)
+            spent.append((described - started, perf_counter() - described))
+        cost = FrontEndCost(*(1e6 * np.mean(spent, axis=0)).tolist())
+    save(path, asdict(cost))
+    return cost
+
+
+def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descriptors]) -> Iterator[Gray]:
+    """Some images of those that have a descriptor, from all of the recordings."""
+    usable = []
+    for number, (sequence, one) in enumerate(zip(sequences, found, strict=True)):
+        names = set(one.table.names)
+        usable += [(number, k) for k, frame in enumerate(sequence.frames) if frame.name in names]
+    chosen = [usable[i] for i in np.unique(np.linspace(0, len(usable) - 1, TIMED).astype(int))]
+    for number, sequence in enumerate(sequences):
+        for image in images_at(sequence, [k for own, k in chosen if own == number]):
+            if isinstance(image, str):
+                raise SourceError(image)
+            yield gray_levels(image)
+
+
+def _microseconds_of_words(dictionaries: Dictionary | DictionarySet, described: Sequence[Descriptors]) -> float:
+    """How long a descriptor takes to become words, one after the other, the mean over the first MANY."""
+    rows = [row[None] for row in np.concatenate([one.values for one in described])[:MANY]]
+    dictionaries.words(rows[0])
+    started = perf_counter()
+    for row in rows:
+        dictionaries.words(row)
+    return 1e6 * (perf_counter() - started) / len(rows)
