@@ -43,6 +43,7 @@ class _ReportCommand(GroupedCommand):
 @shared.words_option(False, "Show the typical frame of each word, too; needs --frames.")
 @shared.reading_options()
 @shared.output_option("report.html", "The page to write: one file.")
+@shared.cache_option
 @shared.talk_options
 def report(beliefs: tuple[Path, ...], frames: tuple[Path, ...], words: Path | None, out: Path, **how: Any) -> None:
     """Write beliefs as a page to point at.

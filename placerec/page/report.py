@@ -52,14 +52,16 @@ def report(
     frames: Iterable[Path | str] = (),
     words: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
+    cache: Path | str | None = None,
     progress: ProgressBar = silent,
 ) -> list[Drive]:
     """Write a page of some beliefs files, or folders of them, to the file `out`; returns its drives.
 
     Files of one name and the same frames are one drive, seen by several systems, which the page shows beside each
     other. What `decode --explain` wrote beside a file is taken in. `frames`: image sources (`source_options`) whose
-    frames are shown; `words`: the words.npz, for the typical frame of each word among these. Raises EvaluationError,
-    SourceError and VisionError for what cannot be read or does not belong together.
+    frames are shown; `words`: the words.npz, for the typical frame of each word among these, and `cache`: see
+    `placerec.vision.describe`. Raises EvaluationError, SourceError and VisionError for what cannot be read or does not
+    belong together.
     """
     named = read_files(beliefs)
     explained = {path: path.with_name(one.name + EXPLAINED) for path, one in named}
@@ -69,7 +71,7 @@ def report(
     if sources := list(frames):
         sequences = sequences_of(drives, find_sequences(sources, options=source_options))
         with progress("describe") as show:
-            tiles = tiles_of(drives, sequences, words, show) if words else {}
+            tiles = tiles_of(drives, sequences, words, show, cache) if words else {}
         with progress("pictures") as show:
             pictures = pictures_of(drives, sequences, wanted_frames(drives, tiles), show)
         shown = Shown(pictures, tiles)

@@ -187,6 +187,7 @@ def test_commands_share_what_lies_beside_their_outputs(tmp_path: Path, monkeypat
         ("train-words", "run", "-o", "words2.npz", *SMALL[:-1]),
         ("learn", "run", "-o", "model", "--views", "plain", "--size", 3, "--image-size", 16),
         ("decode", "run", "-m", "model", "-o", "beliefs"),
+        ("report", "beliefs", "--frames", "run", "-w", "words.npz", "-o", "report.html"),
         ("show-words", "words.npz", "run", "-o", "words.png"),
         ("show-words", "words.npz", "run", "--cache", ".placerec-cache"),
     )
