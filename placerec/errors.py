@@ -69,6 +69,7 @@ _OPTIONAL = {
     "mcap_protobuf": ("mcap-protobuf-support", _BAG),
     "distributed": ("distributed", "distributed"),
     "waitress": ("waitress", "waitress"),
+    "rerun": ("rerun-sdk", "rerun-sdk"),
     "onnxruntime": ("onnxruntime", "onnxruntime"),
     # Where kenlm was beside it and is uninstalled, the module goes, and pip takes ufal-kenlm for installed.
     "kenlm": ("kenlm", "--force-reinstall ufal-kenlm"),

@@ -13,6 +13,8 @@ from placerec.cli import shared
 from placerec.errors import counted
 
 if TYPE_CHECKING:
+    from placerec.frames import SourceOptions
+    from placerec.hohmm import Beliefs
     from placerec.model import Decoding, ModelOptions
     from placerec.model.decoding import ScorerName
 
@@ -240,12 +242,25 @@ def adapt_lm(model: Path, out: Path, add: tuple[str, ...], boost: tuple[str, ...
     "--scorer", type=click.Choice(["native", "kenlm"]), default="native", help="What computes the probabilities."
 )
 @shared.json_option("Write one JSON object per frame instead of tab-separated lines.")
+@click.option(
+    "--rerun",
+    metavar="FILE.rrd",
+    type=shared.FILE,
+    help="Write frames, beliefs, words and labels for the viewer Rerun, too; needs rerun-sdk.",
+)
 @shared.output_option(
     "beliefs/", "The folder to write: one file per sequence. Without it, one sequence goes to stdout.", False
 )
 @shared.cache_option
 @shared.talk_options
-def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, cache: Path | None, **how: Any) -> None:
+def decode(
+    tokens: tuple[Path | str, ...],
+    live: bool,
+    out: Path | None,
+    cache: Path | None,
+    rerun: Path | None,
+    **how: Any,
+) -> None:
     """Find the belief over places for every frame.
 
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, any SOURCE that tokenize takes:
@@ -258,6 +273,8 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, cache: 
     with shared.usage("--method"):
         check_method(how["method"], how["options"], scorer=how["scorer"])
     words = how["words"]
+    if rerun is not None:
+        _check_rerun(tokens, live)
     if live:
         if not (words or (how["model"] / "words.npz").exists()) or len(tokens) > 1 or _STDIN in tokens:
             raise click.UsageError("--live takes one camera or video, and needs -w to see it")
@@ -271,7 +288,7 @@ def decode(tokens: tuple[Path | str, ...], live: bool, out: Path | None, cache: 
     elif _STDIN in tokens and words is None:
         raise click.UsageError("`-` cannot be mixed with files")
     else:
-        _decode_whole(tokens, out, cache=cache, **how)
+        _decode_whole(tokens, out, rerun, cache=cache, **how)
 
 
 def _answer_lines(
@@ -287,8 +304,10 @@ def _answer_lines(
         click.echo(line)
 
 
-def _decode_whole(tokens: tuple[Path | str, ...], out: Path | None, *, model: Path, **how: Any) -> None:
-    """The beliefs of whole sequences: files in `out`, or the one sequence on stdout."""
+def _decode_whole(
+    tokens: tuple[Path | str, ...], out: Path | None, rerun: Path | None, *, model: Path, **how: Any
+) -> None:
+    """The beliefs of whole sequences: files in `out`, or the one sequence on stdout; and the recording `rerun`."""
     from placerec.hohmm import format_beliefs
     from placerec.methods import decode as run
 
@@ -298,6 +317,29 @@ def _decode_whole(tokens: tuple[Path | str, ...], out: Path | None, *, model: Pa
         beliefs = run(tokens, model, out=out, progress=progress, **how)
     if out is None:
         click.echo(format_beliefs(beliefs[0], as_json=how["as_json"]), nl=False)
+    if rerun is not None:
+        _write_rerun(rerun, beliefs, tokens, how["source_options"])
+
+
+def _check_rerun(tokens: tuple[Path | str, ...], live: bool) -> None:
+    """Refuse --rerun, before any work, for what cannot be read twice, and where rerun-sdk is not there."""
+    from placerec.errors import check_optional
+
+    if live or any(token == _STDIN or isinstance(token, str) for token in tokens):
+        raise click.UsageError("--rerun is for whole recordings, whose frames it reads once more; name files")
+    check_optional("rerun", "--rerun")
+
+
+def _write_rerun(
+    path: Path, beliefs: "list[Beliefs]", tokens: tuple[Path | str, ...], source_options: "SourceOptions"
+) -> None:
+    from placerec.frames import find_sequences
+    from placerec.methods.decode import are_images
+    from placerec.page.rerun_file import write_rerun
+
+    sequences = find_sequences(tokens, options=source_options) if are_images(tokens) else []
+    with shared.progress_bar("rerun") as progress:
+        write_rerun(path, beliefs, sequences, progress)
 
 
 def _check_answering(what: str, out: Path | None, options: "Decoding") -> None:

@@ -55,7 +55,8 @@ def decode(
 
     def opened() -> tuple[SequenceDecoder, list[WordStream]]:
         models = load_model(model)
-        path = words or (models.folder.words if _are_images(sources, models) else None)
+        own = models.folder.words
+        path = words or (own if own.exists() and are_images(sources) else None)
         dictionary = None if path is None else _dictionary_for(sources, path)
         decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
         if dictionary is None:
@@ -109,10 +110,8 @@ def _dictionary_for(sources: Sequence[Path | str], path: Path | str) -> "Diction
     return DictionarySet.load(path)
 
 
-def _are_images(sources: Sequence[Path | str], models: PlaceModels) -> bool:
-    """Whether a model that has its dictionary is asked for sources that hold neither token streams nor text."""
-    if not models.folder.words.exists():
-        return False
+def are_images(sources: Sequence[Path | str]) -> bool:
+    """Whether sources are no token streams, hold none, and are no text."""
     paths = [*map(Path, sources)]
     return not any(is_stream(path) or path.suffix == ".txt" or _holds_streams(path) for path in paths)
 
