@@ -166,7 +166,7 @@ def format_results(results: DemoResults) -> str:
     majority = results[BEST]
     lines = [
         f"Synthetic laboratory, {majority.frames} test frames of {len(majority.sequences)} sequences: frames right",
-        f"  {majority.majority_accuracy:6.1%}  always {majority.majority_place} (the majority class)",
+        f"  {majority.majority_accuracy:6.1%}  always {place_title(majority.majority_place)} (the majority class)",
     ]
     lines += [f"  {found.accuracy:6.1%}  {_title(way)}, n = {way[1]}{_note(way[1])}" for way, found in results.items()]
     return "\n".join(lines)

@@ -113,7 +113,8 @@ def lab(out: Path, scale: str, seed: int) -> None:
 
     with shared.progress_bar("render") as progress:
         frames = render_lab(out, scale=scale, seed=seed, progress=progress)
-    shared.log.info("%s: 18 sequences, %d synthetic frames", out, frames)
+    codes = "CR-B is the corridor, TL-B the toilet, 1PO-B the office, PA-B the printer area, KT-B the kitchen"
+    shared.log.info("%s: 18 sequences, %d synthetic frames; %s", out, frames, codes)
 
 
 @shared.command(epilog="Example: placerec demo")

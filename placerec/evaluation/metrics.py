@@ -62,6 +62,7 @@ class Evaluation:
     risk_coverage: RiskCoverage
     new_places: NewPlaces | None  # None where no sequence has the column `unknown`
     sequences: dict[str, SequenceScore]
+    made_by: tuple[str, ...] = ()  # the models and options that made the beliefs, where that is known
 
     def _repr_html_(self) -> str:
         from placerec.evaluation.html import evaluation_html
@@ -93,6 +94,7 @@ class Evaluation:
                 name: dict(zip(self.places, row, strict=True)) for name, row in zip(self.places, counts, strict=True)
             },
             "sequences": {name: dict(vars(score)) for name, score in self.sequences.items()},
+            "made_by": list(self.made_by),
         }
 
 

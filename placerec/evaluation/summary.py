@@ -1,5 +1,7 @@
 """An evaluation as text for a terminal of 100 columns."""
 
+import textwrap
+
 import numpy as np
 
 from placerec.errors import counted
@@ -47,7 +49,12 @@ def _overall(evaluation: Evaluation) -> list[str]:
         f"log loss           {evaluation.log_loss:.3f}   (nats per frame; 0 is best)",
         f"risk-coverage      {evaluation.risk_coverage.area:.3f}   (area; of the surest half {half} are right)",
     ]
-    return [*lines, *_new_places(evaluation), *_sequences(evaluation)]
+    made_by = [line for made in evaluation.made_by for line in _wrapped(f"{'model':<19}", made)]
+    return [*lines, *_new_places(evaluation), *_sequences(evaluation), *made_by]
+
+
+def _wrapped(title: str, text: str) -> list[str]:
+    return textwrap.wrap(text, _WIDTH, initial_indent=title, subsequent_indent=" " * len(title))
 
 
 def _new_places(evaluation: Evaluation) -> list[str]:

@@ -30,6 +30,7 @@ from placerec.figures.strip import axis_of, belief_strip
 from placerec.frames.doubts import warn_of_still_sequences, warn_of_strange_labels
 from placerec.frames.naming import unique_names
 from placerec.hohmm.beliefs import UNKNOWN_PLACE, Beliefs, parse_beliefs, read_beliefs
+from placerec.methods.made_by import makers_of
 from placerec.words.folder import is_stream
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ def evaluate_files(sources: Iterable[Path | str], *, plot: Path | str | None = N
     named = read_files(sources)
     names = unique_names([(one.name, path) for path, one in named], EvaluationError)
     beliefs = [replace(one, stream=one.stream.renamed(name)) for (_, one), name in zip(named, names, strict=True)]
-    evaluation = evaluate(beliefs)
+    evaluation = replace(evaluate(beliefs), made_by=makers_of(path for path, _ in named))
     warn_of_still_sequences(one.truth for one in beliefs)
     columns = dict.fromkeys(place for one in beliefs for place in (*one.places, UNKNOWN_PLACE))
     warn_of_strange_labels((one.truth for one in beliefs), [*columns], any(one.unknown is not None for one in beliefs))

@@ -159,6 +159,7 @@ Results on these {sequences} sequences ({frames} frames) show how placerec works
 
   seq3_*  the standard path: corridor, toilet, office, printer area
   seq4_*  the extended path: the kitchen as well
+  Labels are COLD's: CR-B corridor, TL-B toilet, 1PO-B office, PA-B printer area, KT-B kitchen
   cloudy, night, sunny: the light; 1, 2, 3: the run
   std_cam/t<seconds>_x<metres>_y<metres>_a<radians>.jpeg, localization/places.lst: <file> <place>
 """

@@ -16,6 +16,7 @@ from placerec.hohmm.beliefs import BeliefRow, Beliefs, format_beliefs, format_he
 from placerec.hohmm.explain import EXPLAINED
 from placerec.jobs import Progress
 from placerec.methods.decoders import HOHMM, check_method, make_decoder
+from placerec.methods.made_by import BELIEFS_JSON, describe_making
 from placerec.model import Decoding, PlaceModels, load_model
 from placerec.model.decoding import AS_LEARNED, ScorerName, token_streams
 from placerec.words import WordStream
@@ -24,7 +25,7 @@ from placerec.words.folder import dictionary_of, is_stream, stream_files
 if TYPE_CHECKING:
     from placerec.vision import DictionarySet
 
-OWNED = ("*.tsv", "*.jsonl")
+OWNED = ("*.tsv", "*.jsonl", BELIEFS_JSON)
 log = logging.getLogger(__name__)
 
 
@@ -53,7 +54,7 @@ def decode(
 
     check_method(method, options, scorer=scorer)
 
-    def opened() -> tuple[SequenceDecoder, list[WordStream]]:
+    def opened() -> tuple[SequenceDecoder, list[WordStream], PlaceModels]:
         models = load_model(model)
         own = models.folder.words
         path = words or (own if own.exists() and are_images(sources) else None)
@@ -70,17 +71,18 @@ def decode(
         if out is None and len(streams) > 1:
             raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
         _doubt(streams, models, trained, options)
-        return decoder, streams
+        return decoder, streams, models
 
     if out is None:
         if options.explain:
             raise ModelError("explanations are files: name a folder for them with -o")
-        decoder, streams = opened()
+        decoder, streams, _ = opened()
         return [_decoded(decoder, stream, options) for stream in streams]
     _spare_sources(sources, Path(out))
     found = []
     with whole_folder(Path(out), OWNED) as folder:
-        decoder, streams = opened()
+        decoder, streams, models = opened()
+        write_text(folder / BELIEFS_JSON, describe_making(method, models, options))
         for stream in streams:
             found.append(_decoded(decoder, stream, options))
             _write(folder, decoder, stream, found[-1], options, as_json)

@@ -249,7 +249,7 @@ def test_parents_of_an_output_are_made(world: Path, tmp_path: Path) -> None:
 def test_an_output_is_replaced_whole(world: Path, tmp_path: Path) -> None:
     done("decode", world / "tokens", "-m", world / "model", "-o", tmp_path / "out")
     done("decode", world / "tokens/run1.tsv", "-m", world / "model", "-o", tmp_path / "out")
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["run1.tsv"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["beliefs.json", "run1.tsv"]
 
 
 # Models
@@ -463,6 +463,8 @@ def test_evaluate_reads_a_pipe(world: Path) -> None:
     named = json.loads(done("evaluate", world / "beliefs", "--json").stdout)
     assert piped.pop("sequences").keys() == {"stdin"}
     assert named.pop("sequences").keys() == {"run3"}
+    # What made the beliefs stands beside their file.
+    assert (piped.pop("made_by"), len(named.pop("made_by"))) == ([], 1)
     assert piped == named
     assert piped["frames"] == 60
 

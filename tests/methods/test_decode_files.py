@@ -34,7 +34,12 @@ def test_selection_is_applied_at_test_too(world: Path) -> None:
 def test_decoding_writes_what_it_returns(world: Path) -> None:
     found = decode([world / "tokens"], world / "model", out=world / "beliefs")
     assert [beliefs.name for beliefs in found] == ["run1", "run2", "run3"]
-    assert sorted(path.name for path in (world / "beliefs").iterdir()) == ["run1.tsv", "run2.tsv", "run3.tsv"]
+    assert sorted(path.name for path in (world / "beliefs").iterdir()) == [
+        "beliefs.json",
+        "run1.tsv",
+        "run2.tsv",
+        "run3.tsv",
+    ]
     for beliefs in found:
         again = read_beliefs(world / f"beliefs/{beliefs.name}.tsv")
         assert again.truth == beliefs.truth
@@ -83,7 +88,7 @@ def test_a_failure_leaves_the_old_beliefs(world: Path) -> None:
     (world / "bad.tsv").write_text("time\tword\nsoon\tw01\n")
     with pytest.raises(StreamError, match=r"bad\.tsv:2: time 'soon' is not a number"):
         decode([world / "bad.tsv"], world / "model", out=world / "beliefs")
-    assert [path.name for path in (world / "beliefs").iterdir()] == ["run3.tsv"]
+    assert sorted(path.name for path in (world / "beliefs").iterdir()) == ["beliefs.json", "run3.tsv"]
 
 
 def test_tokens_of_another_dictionary_are_refused(world: Path) -> None:
@@ -163,7 +168,12 @@ def test_json_lines_are_json(world: Path) -> None:
 
 def test_json_files_are_json_lines(world: Path) -> None:
     decode([world / "tokens"], world / "model", out=world / "beliefs", as_json=True)
-    assert sorted(path.name for path in (world / "beliefs").iterdir()) == ["run1.jsonl", "run2.jsonl", "run3.jsonl"]
+    assert sorted(path.name for path in (world / "beliefs").iterdir()) == [
+        "beliefs.json",
+        "run1.jsonl",
+        "run2.jsonl",
+        "run3.jsonl",
+    ]
     for line in (world / "beliefs/run1.jsonl").read_text().splitlines():
         assert json.loads(line, parse_constant=pytest.fail)["place"] in PLACES
 

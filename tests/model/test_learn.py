@@ -62,7 +62,7 @@ def test_tests_train_nothing_and_are_judged(tmp_path: Path, runs: list[Path]) ->
     assert found.dictionaries.sequences == ("run0", "run1", "run2")
     assert found.evaluation is not None
     assert found.evaluation.frames == 16
-    assert sorted(path.name for path in (tmp_path / "model/beliefs").iterdir()) == ["run3.tsv"]
+    assert sorted(path.name for path in (tmp_path / "model/beliefs").iterdir()) == ["beliefs.json", "run3.tsv"]
     evidence = load_model(tmp_path / "model").description.evidence
     assert evidence == found.evidence
     assert evidence.words
