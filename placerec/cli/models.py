@@ -252,10 +252,12 @@ def adapt_lm(model: Path, out: Path, add: tuple[str, ...], boost: tuple[str, ...
     "beliefs/", "The folder to write: one file per sequence. Without it, one sequence goes to stdout.", False
 )
 @shared.cache_option
+@shared.live_page_options
 @shared.talk_options
 def decode(
     tokens: tuple[Path | str, ...],
     live: bool,
+    page: dict[str, Any] | None,
     out: Path | None,
     cache: Path | None,
     rerun: Path | None,
@@ -266,9 +268,9 @@ def decode(
     TOKENS are token streams (.tsv), folders of them, or plain texts of words; with -w, any SOURCE that tokenize takes:
     folders of images, videos, bags, lists. `-` without -w reads one word a line (or word, tab, seconds, tab, distance)
     and answers each at once. With -w and --live, TOKENS is a camera (camera:0, camera:/dev/video2,
-    camera:rtsp://...) or a video; frames that come too fast are dropped, and Ctrl-C ends it.
+    camera:rtsp://...) or a video; frames that come too fast are dropped, and Ctrl-C ends it. --page shows them.
     """
-    from placerec.methods import check_method, decode_live
+    from placerec.methods import check_method
 
     with shared.usage("--method"):
         check_method(how["method"], how["options"], scorer=how["scorer"])
@@ -279,9 +281,9 @@ def decode(
         if not (words or (how["model"] / "words.npz").exists()) or len(tokens) > 1 or _STDIN in tokens:
             raise click.UsageError("--live takes one camera or video, and needs -w to see it")
         _check_answering("--live", out, how["options"])
-        with closing(decode_live(tokens[0], **how)) as answers:
-            for line in answers:
-                click.echo(line)
+        _answer_live(tokens[0], page, **how)
+    elif page is not None:
+        raise click.UsageError("--page shows what comes live: it needs --live")
     elif tokens == (_STDIN,) and words is None:
         _check_answering("`-`", out, how["options"])
         _answer_lines(**how)
@@ -289,6 +291,21 @@ def decode(
         raise click.UsageError("`-` cannot be mixed with files")
     else:
         _decode_whole(tokens, out, rerun, cache=cache, **how)
+
+
+def _answer_live(source: Path | str, page: dict[str, Any] | None, **how: Any) -> None:
+    """An answer for each frame of a camera or a video as it comes, and perhaps a page."""
+    from placerec.methods import decode_live
+
+    if page is not None:
+        from placerec.page.live import decode_live_page
+
+        lines = decode_live_page(source, **page, **how)
+    else:
+        lines = decode_live(source, **how)
+    with closing(lines) as answers:
+        for line in answers:
+            click.echo(line)
 
 
 def _answer_lines(

@@ -42,19 +42,20 @@ def picture_at(sequence: Sequence, index: int, height: int) -> Gray | str:
 
     (h, w, 3) blue, green, red, or (h, w) where the source has grey levels alone, uint8, h at most `height`.
     """
-    import cv2
-
-    pixels: NDArray[Any]
     try:
         if sequence.recording is None:
-            pixels = read_colours(sequence.frames[index].path, height)
+            found: Gray | str = read_colours(sequence.frames[index].path, height)
         else:
             found = sequence.recording.picture(index)
-            if isinstance(found, str):
-                return found
-            pixels = found
     except SourceError as error:
         return str(error)
+    return found if isinstance(found, str) else shrunk(found, height)
+
+
+def shrunk(pixels: NDArray[Any], height: int) -> Gray:
+    """Pixels (h, w) or (h, w, 3) as uint8, made smaller if they are more than `height` high."""
+    import cv2
+
     high, wide = pixels.shape[:2]
     if high > height:
         pixels = cv2.resize(pixels, (max(1, round(wide * height / high)), height), interpolation=cv2.INTER_AREA)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from placerec.frames.images import all_images
 from placerec.frames.live import LatestFrameQueue, LiveFrame, Stopped, ended_by_interrupt, real_time
 from placerec.frames.sequence import gray_levels
 from placerec.hohmm import Belief, SequenceDecoder, format_header
+from placerec.hohmm.decoder import Distances, Words
 from placerec.methods.decode import format_belief
 from placerec.methods.decoders import HOHMM, make_decoder
 from placerec.model import load_model
@@ -81,6 +82,29 @@ def decode_live(
     `words`: the words.npz, by default that in `model`. `method`: one of `METHODS`. Raises ModelError for options that
     look ahead or write files, and StreamError unless `source` is one sequence of images.
     """
+    sequence, dictionary, decoder = open_live(
+        source, model, words=words, method=method, source_options=source_options, options=options, scorer=scorer
+    )
+    header = None if as_json else format_header(decoder.places, unknown=decoder.asks_unknown)
+    with closing(follow_live(sequence, dictionary, decoder)) as answers:
+        for frame, belief in answers:
+            if header is not None:
+                yield header
+                header = None
+            yield format_belief(frame.name, frame.time, frame.place, belief, as_json=as_json)
+
+
+def open_live(
+    source: Path | str,
+    model: Path | str,
+    *,
+    words: Path | str | None,
+    method: str,
+    source_options: SourceOptions,
+    options: Decoding,
+    scorer: ScorerName,
+) -> "tuple[Sequence, DictionarySet, SequenceDecoder]":
+    """What is followed live, what turns its images into words, and words into beliefs; arguments: see `decode_live`."""
     from placerec.vision import DictionarySet
 
     if options.looks_ahead or options.explain:
@@ -93,20 +117,25 @@ def decode_live(
     sequences = find_sequences([source], options=source_options, endless=True)
     if len(sequences) > 1:
         raise StreamError(f"{source}: holds {len(sequences)} sequences; name one of them to be played live")
-    header = None if as_json else format_header(decoder.places, unknown=decoder.asks_unknown)
-    with closing(follow_live(sequences[0], dictionary, decoder)) as answers:
-        for frame, belief in answers:
-            if header is not None:
-                yield header
-                header = None
-            yield format_belief(frame.name, frame.time, frame.place, belief, as_json=as_json)
+    return sequences[0], dictionary, decoder
+
+
+class Answering(Protocol):
+    """What answers frames: a `SequenceDecoder`, or what stands before one."""
+
+    def answer(self, words: Words, time: float | None = None, distance: Distances = None) -> Belief:
+        """The belief after one more frame with these words."""
+
+    def skip(self, time: float | None = None) -> Belief:
+        """The belief after one more frame that has no word."""
 
 
 def follow_live(
     sequence: Sequence,
     dictionary: "Dictionary | DictionarySet",
-    decoder: SequenceDecoder,
+    decoder: Answering,
     *,
+    see: Callable[[LiveFrame], None] | None = None,
     tell: Callable[[LiveReport], None] | None = None,
 ) -> Generator[tuple[Frame, Belief], None, None]:
     """Each frame and the belief after it, until the sequence ends or, in the main thread, Ctrl-C is pressed.
@@ -115,7 +144,7 @@ def follow_live(
     for transitions per frame. So do frames without a usable image, which give no belief. Both are logged, and so is
     the report at the end, which `tell` gets, too. Whoever iterates is part of the latency: a frame is answered when
     the next one is asked for. Raises SourceError for a source that gives nothing, StreamError for times that are
-    needed and missing or go back.
+    needed and missing or go back. `see` gets each frame that is worked on, before.
     """
     tally = _Tally(sequence)
     # Filters are made when they are first needed: not while the first frames wait.
@@ -123,6 +152,8 @@ def follow_live(
     with closing(LatestFrameQueue(lambda stopped: _live_frames(sequence, stopped))) as queue, ended_by_interrupt(queue):
         try:
             for live in queue:
+                if see is not None:
+                    see(live)
                 for _ in range(tally.missed(live)):
                     decoder.skip()
                 belief = _believed(live, dictionary, decoder, tally)
@@ -145,7 +176,7 @@ def _live_frames(sequence: Sequence, stopped: Stopped) -> Iterator[LiveFrame]:
 
 
 def _believed(
-    live: LiveFrame, dictionary: "Dictionary | DictionarySet", decoder: SequenceDecoder, tally: "_Tally"
+    live: LiveFrame, dictionary: "Dictionary | DictionarySet", decoder: Answering, tally: "_Tally"
 ) -> Belief | None:
     frame, image = live.frame, live.image
     try:

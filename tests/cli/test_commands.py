@@ -69,7 +69,10 @@ def test_commands_are_listed_by_what_people_do() -> None:
 @pytest.mark.parametrize(
     ("name", "groups"),
     [
-        ("decode", ["Options", "How sources are read", "How words become beliefs", "What is kept", "General"]),
+        (
+            "decode",
+            ["Options", "How sources are read", "How words become beliefs", "What is kept", "The page", "General"],
+        ),
         (
             "train-words",
             [

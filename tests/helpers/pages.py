@@ -9,7 +9,7 @@ import urllib.parse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import IO, Any
 
 # However this process was started, that one is to hear of Ctrl-C.
 _PLACEREC = (
@@ -56,13 +56,17 @@ class Served:
 
 
 @contextmanager
-def serving(*args: object) -> Iterator[Served]:
-    """A command with a page, without a browser; it is interrupted at the end, and must end well."""
+def serving(*args: object, stdout: IO[str] | None = None) -> Iterator[Served]:
+    """A command with a page, without a browser; it is interrupted at the end, and must end well.
+
+    `stdout`: where its data go, if these are not the address, which then is on stderr.
+    """
     command = [sys.executable, "-c", _PLACEREC, *map(str, args), "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout
+    out = subprocess.PIPE if stdout is None else stdout
+    with subprocess.Popen(command, stdout=out, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr
-        address = process.stdout.readline().strip()
+        told = process.stdout or process.stderr
+        address = next((line.strip() for line in told if line.startswith("http")), "")
         if not address:
             raise AssertionError(process.stderr.read())
         try:
