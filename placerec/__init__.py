@@ -51,6 +51,7 @@ _ROOMS = {
     "placerec.inspection.word_sheet": ("show_words",),
     "placerec.inspection.word_stability": ("stability",),
     "placerec.page.label": ("label_pages",),
+    "placerec.vision.light": ("relight",),
     "placerec.page.report": ("report",),
     "placerec.lab.layout": ("render_lab",),
 }
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
         gist,
         train_dictionary,
     )
+    from placerec.vision.light import relight
     from placerec.words import Selection, WordStream, parse_selection, read_stream, select, write_stream
     from placerec.words.tokenize import tokenize
 
@@ -151,6 +153,7 @@ __all__ = [
     "read_gray",
     "read_stream",
     "read_transitions",
+    "relight",
     "render_lab",
     "report",
     "select",

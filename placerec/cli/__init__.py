@@ -64,7 +64,7 @@ GROUPS = {
         *("label", "learn", "describe", "train-words", "tokenize", "train-lm"),
         *("decode", "evaluate", "calibrate", "update"),
     ),
-    "Look": ("report", "show-words", "show-frame", "stability", "inspect"),
+    "Look": ("report", "show-words", "show-frame", "stability", "relight", "inspect"),
     "Language models": ("check", "adapt-lm"),
     "Experiments": ("demo", "lab", "compare", "experiment"),
 }

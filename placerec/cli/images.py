@@ -166,3 +166,27 @@ def stability(sources: tuple[Path, ...], words: Path, out: Path | None, as_json:
     with shared.progress_bar("stability") as progress:
         found = run(sources, words, out, progress=progress, **how)
     shared.echo_json(found.to_json()) if as_json else click.echo(format_stability(found))
+
+
+@shared.command(epilog="Example: placerec relight RUNS/run3 -o dim/ --light dim")
+@shared.source_arguments
+@click.option(
+    "--light",
+    required=True,
+    type=click.Choice(["dim", "warm", "lamp", "exposure"]),
+    help="A fifth of the light with a sensor's noise; a warm light; a coloured lamp from one side; x 0.45 or x 2.2.",
+)
+@shared.seed_option("Seed of what is drawn for every sequence, and of the noise.")
+@shared.output_option("RELIT/", "The folder to write: a sequence in COLD's layout for every sequence, with its labels.")
+@shared.talk_options
+def relight(sources: tuple[Path, ...], out: Path, light: str, **how: Any) -> None:
+    """Write recordings as they might look in another light (simulated).
+
+    SOURCE is what tokenize takes. What was learned in one light can be tried in others: `placerec decode RELIT/ -m
+    MODEL/`, `placerec learn RUNS/ RELIT/`. The formulas are in docs/vision.md.
+    """
+    from placerec.vision.light import relight as run
+
+    with shared.progress_bar("relight") as progress:
+        written = run(sources, out, light, progress=progress, **how)
+    click.echo(f"{written} frames in {out}", err=True)

@@ -2,7 +2,7 @@
 
 Real recordings of one building in several lights are rare; these stand in for them, and every number that comes of
 them is called simulated. An image's levels v of 0..255 are taken as linear light (v / 255)^2.2, changed there, brought
-back, rounded, cut to 0..255 and stored as a JPEG of quality 90 again, as a camera would.
+back, rounded and cut to 0..255; `placerec relight` stores it as a JPEG of quality 90 again, as a camera would.
 
 dim       a fifth of the light, with shot noise (1,000 electrons at full scale) and read noise of 3 electrons
 warm      red x (1 + s/4), green x (1 - 0.08 s), blue x (1 - 0.45 s), with s of 0.7 to 1.3
@@ -12,17 +12,28 @@ exposure  x 0.45 or x 2.2
 What is drawn (s, the side, the colour, the factor) is drawn once for a sequence; noise is drawn for every frame.
 """
 
+import logging
+import math
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec.arrays import Singles
 from placerec.errors import VisionError
+from placerec.files import whole_folder
+from placerec.frames import Sequence, SourceOptions, all_images, find_sequences
+from placerec.frames.layouts import COLD_LIST, COLD_LIST_FOLDER
+from placerec.frames.sequence import ColourImage, Colours, Frame
+from placerec.jobs import Progress
 
-Colours = NDArray[np.uint8]
+log = logging.getLogger(__name__)
+
+README = "README.txt"
+_HEAD = "Real frames under simulated light, by `placerec relight`"
+CAMERA = "std_cam"
 _GAMMA = 2.2
 _LINEAR = ((np.arange(256) / 255) ** _GAMMA).astype(np.float32)
 _ELECTRONS, _READ = 1000, 3.0
@@ -31,22 +42,95 @@ _LAMPS = ((1.6, 0.8, 0.45), (0.6, 1.0, 1.6), (0.8, 1.5, 0.7))
 _QUALITY = 90
 
 
-def relight(image: Colours, light: str, *, seed: int, sequence: str, frame: int) -> Colours:
-    """An image (h, w, 3) blue, green, red of 0..255, or grey (h, w), uint8, in another light, one of LIGHTS.
+def relight(
+    sources: Iterable[Path | str],
+    out: Path | str,
+    light: str,
+    *,
+    seed: int = 0,
+    source_options: SourceOptions = SourceOptions(),
+    progress: Progress | None = None,
+) -> int:
+    """`placerec relight`: write the folder `out` with every sequence in another light, in COLD's layout, and labelled.
+
+    Returns the number of frames. An image that cannot be read is named in a warning and left out. `progress` is called
+    with frames done and in all. Raises VisionError for an unknown light and if no image can be read, SourceError for
+    sources, OutputError for the folder.
+    """
+    _check(light)
+    written = 0
+    with whole_folder(Path(out), _owned(Path(out))) as folder:
+        sequences = find_sequences(sources, options=source_options)
+        total = sum(len(one.frames) for one in sequences)
+        done = 0
+        for sequence in sequences:
+            for kept in _write_sequence(sequence, folder / sequence.name, light, seed):
+                written += kept
+                done += 1
+                if progress is not None:
+                    progress(done, total)
+        if not written:
+            raise VisionError(f"none of the {total} images can be read; name a folder with images")
+        (folder / README).write_text(f"{_HEAD}: {light}, seed {seed}.\n", encoding="utf-8", newline="\n")
+    return written
+
+
+def _owned(out: Path) -> tuple[str, ...]:
+    """What may be replaced: all that `relight` wrote, and nothing where something else did."""
+    try:
+        with (out / README).open(encoding="utf-8") as file:
+            return ("*",) if file.read(len(_HEAD)) == _HEAD else ()
+    except (OSError, UnicodeDecodeError):
+        return ()
+
+
+def _write_sequence(sequence: Sequence, folder: Path, light: str, seed: int) -> Iterator[bool]:
+    """Write a sequence, and yield for every frame whether it could be read."""
+    labels = []
+    (folder / CAMERA).mkdir(parents=True)
+    (folder / COLD_LIST_FOLDER).mkdir()
+    for number, (frame, image) in enumerate(all_images(sequence, colours=True)):
+        if isinstance(image, str):
+            log.warning("%s; the frame is left out", image)
+            yield False
+            continue
+        pixels = image.colours if isinstance(image, ColourImage) else image
+        levels = np.rint(pixels.clip(0, 255)).astype(np.uint8)
+        name = _name(frame, number)
+        found = relit(levels, light, seed=seed, sequence=sequence.name, frame=number)
+        _, stored = cv2.imencode(".jpg", found, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        (folder / CAMERA / name).write_bytes(stored.tobytes())
+        if frame.place:
+            labels.append(f"{name} {frame.place}\n")
+        yield True
+    (folder / COLD_LIST_FOLDER / COLD_LIST).write_text("".join(labels), encoding="utf-8", newline="\n")
+
+
+def _name(frame: Frame, number: int) -> str:
+    """The file's name: that of the frame's own file, or what tells the time of a frame of a recording."""
+    if frame.path.name == frame.name:
+        return f"{Path(frame.name).stem}.jpeg"
+    return f"frame_{number:06d}.jpeg" if math.isnan(frame.time) else f"t{frame.time:.6f}.jpeg"
+
+
+def relit(image: Colours, light: str, *, seed: int, sequence: str, frame: int) -> Colours:
+    """An image uint8 (h, w, 3) blue, green, red, or grey (h, w), in another light, one of LIGHTS: uint8 (h, w, 3).
 
     `seed` and `sequence` decide what is drawn for the whole sequence, the number `frame` the noise. The same arguments
     give the same bytes. Raises VisionError for an unknown light.
     """
-    if light not in LIGHTS:
-        raise VisionError(f"no simulated light is called {light!r}; choose one of {', '.join(LIGHTS)}")
+    _check(light)
     key = [seed, zlib.crc32(light.encode()), zlib.crc32(sequence.encode())]
     of_sequence, of_frame = (np.random.Generator(np.random.PCG64(some)) for some in (key, [*key, frame]))
     colours = image if image.ndim == 3 else np.repeat(image[:, :, None], 3, axis=2)
     linear = LIGHTS[light](_LINEAR[colours], of_sequence, of_frame)
-    levels = np.rint(255 * np.clip(linear, 0, 1) ** (1 / _GAMMA)).astype(np.uint8)
-    _, stored = cv2.imencode(".jpg", levels, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    flag = cv2.IMREAD_COLOR if image.ndim == 3 else cv2.IMREAD_GRAYSCALE
-    return np.asarray(cv2.imdecode(stored, flag), np.uint8)
+    levels: Colours = np.rint(255 * np.clip(linear, 0, 1) ** (1 / _GAMMA)).astype(np.uint8)
+    return levels
+
+
+def _check(light: str) -> None:
+    if light not in LIGHTS:
+        raise VisionError(f"no simulated light is called {light!r}; choose one of {', '.join(LIGHTS)}")
 
 
 def _dim(linear: Singles, of_sequence: np.random.Generator, of_frame: np.random.Generator) -> Singles:
