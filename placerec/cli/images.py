@@ -31,7 +31,7 @@ def describe(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
         describe_sources(sources, out, progress=progress, **how)
 
 
-@shared.command("train-words", epilog="Example: placerec train-words RUNS/ -o words.npz --size 20")
+@shared.command("train-words", epilog="Example: placerec train-words RUNS/run1 RUNS/run2 -o words.npz --size 20")
 @shared.source_arguments
 @shared.dictionary_options
 @shared.as_in_paper(
