@@ -60,7 +60,15 @@ def learn(
     )
     evaluation = None
     if tests:
-        beliefs = decode(tests, path, out=path / BELIEFS, source_options=source_options, cache=cache, progress=progress)
+        beliefs = decode(
+            tests,
+            path,
+            network=spec.network.file if spec and spec.network else None,
+            out=path / BELIEFS,
+            source_options=source_options,
+            cache=cache,
+            progress=progress,
+        )
         evaluation = evaluate(beliefs)
     return Learned(path, DictionarySet.load(path / "words.npz"), evidence, evaluation)
 

@@ -70,6 +70,7 @@ def train_words(sources: tuple[Path, ...], out: Path, words: "DictionarySetOptio
 @shared.source_arguments
 @shared.words_option(True, "The dictionary of train-words.")
 @shared.matrix_option
+@shared.network_option
 @shared.output_option("tokens/", "The folder to write: one .tsv per sequence, and vocab.txt.")
 @shared.cache_option
 @shared.work_options
@@ -93,6 +94,7 @@ def tokenize(sources: tuple[Path, ...], words: Path, out: Path, **how: Any) -> N
 @shared.source_arguments
 @shared.dictionary_option
 @shared.matrix_option
+@shared.network_option
 @shared.output_option("words.png", "Draw all words on one sheet: .png, .svg or .pdf.", required=False)
 @shared.json_option("Print JSON, with a row for every unit of the map.")
 @shared.cache_option
@@ -118,6 +120,7 @@ def show_words(words: Path, sources: tuple[Path, ...], out: Path | None, as_json
 @shared.reading_options()
 @shared.words_option(True, "The dictionary of train-words.")
 @shared.dictionary_option
+@shared.network_option
 @shared.output_option("seen.png", "Draw what the descriptor sees: .png, .svg or .pdf.", required=False)
 @shared.json_option()
 @shared.cache_option
@@ -142,6 +145,7 @@ def show_frame(
 @shared.source_arguments
 @shared.words_option(True, "The dictionary of train-words.")
 @shared.dictionary_option
+@shared.network_option
 @click.option(
     "--sample",
     metavar="N",

@@ -226,6 +226,7 @@ def adapt_lm(model: Path, out: Path, add: tuple[str, ...], boost: tuple[str, ...
 @click.argument("tokens", metavar="TOKENS...", nargs=-1, required=True, type=shared.PATH_OR_STREAM)
 @click.option("-m", "--model", metavar="MODEL/", type=shared.PATH, required=True, help="The folder of train-lm.")
 @shared.words_option(False, "The dictionary, if TOKENS are images.  [default: MODEL/words.npz, if it is there]")
+@shared.network_option
 @shared.reading_options(" of images")
 @shared.decoding_options
 @shared.groups.belief("--viterbi", is_flag=True, help="Write the most probable path as best.")

@@ -10,7 +10,7 @@ import numpy as np
 from placerec.errors import SourceError
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.frames import Sequence as FrameSequence, images_at
-from placerec.frames.sequence import Gray, gray_levels
+from placerec.frames.sequence import Image
 from placerec.vision import Descriptors, Dictionary, DictionarySet, descriptor
 
 # Images that the cost is measured on, and descriptors that it is where these were computed elsewhere.
@@ -42,9 +42,9 @@ def front_end_cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dict
         cost = FrontEndCost(math.nan, _microseconds_of_words(dictionary, tests))
     else:
         spent = []
-        for gray in _spread_images(sequences, tests):
+        for image in _spread_images(sequences, tests, dictionary.spec.colours):
             started = perf_counter()
-            row = descriptor(gray, dictionary.spec)[None]
+            row = descriptor(image, dictionary.spec)[None]
             described = perf_counter()
             dictionary.words(row)
             spent.append((described - started, perf_counter() - described))
@@ -53,7 +53,7 @@ def front_end_cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dict
     return cost
 
 
-def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descriptors]) -> Iterator[Gray]:
+def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descriptors], colours: bool) -> Iterator[Image]:
     """Some images of those that have a descriptor, from all of the recordings."""
     usable = []
     for number, (sequence, one) in enumerate(zip(sequences, found, strict=True)):
@@ -61,10 +61,10 @@ def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descripto
         usable += [(number, k) for k, frame in enumerate(sequence.frames) if frame.name in names]
     chosen = [usable[i] for i in np.unique(np.linspace(0, len(usable) - 1, TIMED).astype(int))]
     for number, sequence in enumerate(sequences):
-        for image in images_at(sequence, [k for own, k in chosen if own == number]):
+        for image in images_at(sequence, [k for own, k in chosen if own == number], colours=colours):
             if isinstance(image, str):
                 raise SourceError(image)
-            yield gray_levels(image)
+            yield image
 
 
 def _microseconds_of_words(dictionaries: Dictionary | DictionarySet, described: Sequence[Descriptors]) -> float:

@@ -80,14 +80,15 @@ def files_of(sequence: Sequence) -> list[Path]:
 class Batch:
     """Some consecutive frames of a sequence. `first`: the index of the first of them there.
 
-    `images`: their grey levels or colours, or why there are none; None if each is still in a file of its own. `known`:
-    what was found of the frames before, for which their images are not needed; None if nothing was.
+    `images`: what is left of their images once they were made smaller, or why there are none; None if each is still in
+    a file of its own. `known`: what was found of the frames before, for which their images are not needed; None if
+    nothing was.
     """
 
     sequence: str
     first: int
     frames: tuple[Frame, ...]
-    images: tuple[Image | str, ...] | None = None
+    images: tuple[Any, ...] | None = None
     known: bytes | None = None
 
 
@@ -112,7 +113,7 @@ def batches(sequences: Iterable[Sequence], *, colours: bool = False) -> Iterator
 
 
 def with_images(
-    listed: Iterable[tuple[Sequence, Batch]], shrink: Callable[[Image | str], Image | str], *, colours: bool = False
+    listed: Iterable[tuple[Sequence, Batch]], shrink: Callable[[Image | str], Any], *, colours: bool = False
 ) -> Iterator[Batch]:
     """The batches, those of recordings with their images, which are read in one pass where nothing is known between.
 

@@ -12,9 +12,10 @@ from placerec.arrays import Floats, Ints, Singles
 from placerec.errors import SourceError
 from placerec.evaluation.summary import percent, shorten
 from placerec.figures.canvas import MARGIN, figure_file, panel, picture_file, place_title, write_line
-from placerec.frames import Sequence, SourceOptions, read_gray
+from placerec.frames import Sequence, SourceOptions
 from placerec.frames.folder import is_image
-from placerec.frames.sequence import Gray
+from placerec.frames.image import read_image
+from placerec.frames.sequence import Gray, gray_levels
 from placerec.inspection.words import WordTable, look_up, typical_images
 from placerec.jobs import Progress
 from placerec.vision import DescriptorSpec, Dictionary, DictionarySet, descriptor, fit_image
@@ -78,19 +79,20 @@ def show_frame(
     out: Path | str | None = None,
     *,
     name: str = "",
+    network: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     cache: Path | str | None = None,
     progress: Progress | None = None,
 ) -> FrameView:
     """`placerec show-frame`: what a words.npz sees in an image, and which units are nearest to it.
 
-    `sources`: sequences whose frames tell what the units look like and which places they belong to. `out`: the
-    picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first. `cache`: see
-    `placerec.vision.describe`. Raises SourceError and VisionError for what cannot be read, OutputError for a picture
-    that cannot be written, MissingExtraError without matplotlib.
+    `sources`: sequences whose frames tell what the units look like and which places they belong to. `out`: the picture
+    to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first. `network`: the file of
+    the image network, for words of one. `cache`: see `placerec.vision.describe`. Raises SourceError and VisionError for
+    what cannot be read, OutputError for a picture that cannot be written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
-        dictionary = DictionarySet.load(words).named(name)
+        dictionary = DictionarySet.load(words, network=network).named(name)
         view = view_frame(image, dictionary)
         sequences: list[Sequence] = []
         if sources := list(sources):
@@ -107,8 +109,8 @@ def show_frame(
 def view_frame(image: Path | str, dictionary: Dictionary) -> FrameView:
     """Look at one image file with a dictionary. Raises SourceError or VisionError for one that cannot be used."""
     spec = dictionary.spec
-    gray = read_gray(Path(image))
-    values = descriptor(gray, spec)
+    read = read_image(Path(image), colours=spec.colours)
+    values = descriptor(read, spec)
     code = project(values[None], dictionary.pca).astype(np.float64)
     distances = np.sqrt(np.square(dictionary.codebook - code).sum(axis=1))
     unit = int(dictionary.words(values[None])[0][0])
@@ -116,7 +118,7 @@ def view_frame(image: Path | str, dictionary: Dictionary) -> FrameView:
     return FrameView(
         Path(image).name,
         spec,
-        fit_image(gray, spec.image_size, spec.fit),
+        fit_image(gray_levels(read), spec.image_size, spec.fit),
         values,
         dictionary.vocabulary,
         dictionary.hits,

@@ -68,6 +68,7 @@ def show_words(
     out: Path | str | None = None,
     *,
     name: str = "",
+    network: Path | str | None = None,
     matrix: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     cache: Path | str | None = None,
@@ -76,13 +77,13 @@ def show_words(
     """`placerec show-words`: what the words of a words.npz look like among the frames of the sources.
 
     `out`: the picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first.
-    `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed elsewhere; `cache`: where they
-    are kept for other runs (`placerec.vision.describe` tells of both).
-    Raises SourceError and VisionError for what cannot be read, OutputError for a picture that cannot be written,
-    MissingExtraError without matplotlib.
+    `network`: the file of the image network, for words of one. `matrix`: the frames' descriptors, for a dictionary of
+    descriptors that were computed elsewhere; `cache`: where they are kept for other runs (`placerec.vision.describe`
+    tells of both). Raises SourceError and VisionError for what cannot be read, OutputError for a picture that cannot be
+    written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
-        dictionary = DictionarySet.load(words).named(name)
+        dictionary = DictionarySet.load(words, network=network).named(name)
         table, sequences = look_up(sources, dictionary, source_options, progress, matrix, cache)
         if picture is not None:
             images = typical_images(table, sequences)

@@ -8,7 +8,7 @@ from functools import partial
 from itertools import groupby, islice
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any, cast
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,11 +18,12 @@ from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import SourceError, VisionError, counted
 from placerec.evaluation.summary import percent
 from placerec.figures.canvas import figure_file, picture_file
-from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at, read_gray
-from placerec.frames.sequence import Gray, Image, gray_levels
+from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at
+from placerec.frames.image import read_image
+from placerec.frames.sequence import ColourImage, Image
 from placerec.jobs import Executor, Progress, workers
 from placerec.vision import Dictionary, DictionarySet
-from placerec.vision.spec import DescriptorSpec, describer, descriptor
+from placerec.vision.spec import DescriptorSpec, check_describable, descriptor
 
 log = logging.getLogger(__name__)
 
@@ -37,13 +38,19 @@ _FAR, _NEAR = "#D55E00", "#56B4E9"
 _NEXT = "the next frame, for comparison"
 
 
+Pixels = NDArray[Any]
+
+
 @dataclass(frozen=True)
 class Change:
-    """One way to spoil a picture: `apply(gray, spec, rng)` gives a picture of the same or of the fitted size."""
+    """One way to spoil a picture: `apply(pixels, spec, rng)` gives pixels of the same or of the fitted size.
+
+    Pixels are grey (h, w), or blue, green, red (h, w, 3).
+    """
 
     kind: str
     amount: str
-    apply: Callable[[Gray, DescriptorSpec, np.random.Generator], Gray]
+    apply: Callable[[Pixels, DescriptorSpec, np.random.Generator], Pixels]
 
 
 @dataclass(frozen=True)
@@ -115,6 +122,7 @@ def stability(
     out: Path | str | None = None,
     *,
     name: str = "",
+    network: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     seed: int = 0,
     sample: int = SAMPLE,
@@ -124,11 +132,12 @@ def stability(
     """`placerec stability`: how many frames of the sources get another word by what a camera does to pictures.
 
     `out`: the picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first.
-    `seed`, `sample`, `work`: see `word_changes`. Raises SourceError and VisionError for what cannot be read,
-    OutputError for a picture that cannot be written, MissingExtraError without matplotlib.
+    `network`: the file of the image network, for words of one. `seed`, `sample`, `work`: see `word_changes`. Raises
+    SourceError and VisionError for what cannot be read, OutputError for a picture that cannot be written,
+    MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
-        dictionary = DictionarySet.load(words).named(name)
+        dictionary = DictionarySet.load(words, network=network).named(name)
         sequences = find_sequences(sources, options=source_options)
         found = word_changes(sequences, dictionary, seed=seed, sample=sample, work=work, progress=progress)
         if picture is not None:
@@ -147,20 +156,21 @@ def word_changes(
 ) -> Stability:
     """The words of `sample` frames, drawn by `seed`, as they are and after each of CHANGES, compared; of all if fewer.
 
-    The picture is changed as the file holds it, in grey and before it is fitted, and stays of 8 bits where it was.
+    The picture is changed as the file holds it, before it is fitted, and stays of 8 bits where it was: in grey, and for
+    descriptors of colours in these, too, but for the resize filter, which is that of grey levels.
     Noise is drawn by seed and number of the frame. `work`: who does the work (`jobs.workers`), None for threads; the
     result does not depend on it. `progress` is called with pictures done and in all. An image that cannot be read is
     skipped and named in a warning; VisionError if none can be read, or if the dictionary is of descriptors that were
     computed elsewhere.
     """
-    describer(dictionary.spec)
+    check_describable(dictionary.spec)
     sequences = list(sequences)
     starts = np.cumsum([0, *(len(sequence.frames) for sequence in sequences)])
     total = int(starts[-1])
     drawn = np.sort(np.random.Generator(np.random.PCG64(seed)).permutation(total)[:sample])
     # With the frame after each, of the same sequence.
     wanted = np.union1d(drawn, np.setdiff1d(drawn + 1, starts))
-    parts = _parts(sequences, starts, wanted, np.isin(wanted, drawn))
+    parts = _parts(sequences, starts, wanted, np.isin(wanted, drawn), dictionary.spec.colours)
     words = []
     for found, complaints in (work or workers())(_Look(dictionary, seed), parts):
         for complaint in complaints:
@@ -187,12 +197,12 @@ class _Part:
     images: tuple[Image | str, ...] | None
 
 
-def _parts(sequences: list[Sequence], starts: Ints, wanted: Ints, changed: Mask) -> Iterator[_Part]:
+def _parts(sequences: list[Sequence], starts: Ints, wanted: Ints, changed: Mask, colours: bool) -> Iterator[_Part]:
     """The wanted frames with what is to be done to them, a second or so of work each time."""
     for sequence, start, end in zip(sequences, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
         own = slice(*np.searchsorted(wanted, (start, end)).tolist())
         at = (wanted[own] - start).tolist()
-        images = iter(()) if sequence.recording is None else images_at(sequence, at)
+        images = iter(()) if sequence.recording is None else images_at(sequence, at, colours=colours)
         for first in range(own.start, own.stop, _TOGETHER):
             some = slice(first, min(first + _TOGETHER, own.stop))
             frames = tuple(sequence.frames[number - start] for number in wanted[some].tolist())
@@ -271,50 +281,58 @@ def _described(
     if isinstance(image, str):
         return image
     try:
-        gray = read_gray(frame.path) if image is None else gray_levels(image)
-        changes = () if rng is None else (descriptor(each.apply(gray, spec, rng), spec) for each in CHANGES)
-        return np.stack([descriptor(gray, spec), *changes])
+        read = read_image(frame.path, colours=spec.colours) if image is None else image
+        changes = () if rng is None else (descriptor(_changed(each, read, spec, rng), spec) for each in CHANGES)
+        return np.stack([descriptor(read, spec), *changes])
     except SourceError as error:
         return str(error)
     except VisionError as error:
         return f"{frame.path}: frame {frame.name}: {error}"
 
 
-def _like(values: NDArray[Any], gray: Gray) -> Gray:
-    """Grey values cut to 0..255, and to whole numbers where the picture's are."""
+def _changed(change: Change, image: Image, spec: DescriptorSpec, rng: np.random.Generator) -> Image:
+    if isinstance(image, ColourImage):
+        return ColourImage(change.apply(image.gray, spec, rng), change.apply(image.colours, spec, rng))
+    return change.apply(image, spec, rng)
+
+
+def _like(values: Pixels, pixels: Pixels) -> Pixels:
+    """Values cut to 0..255, and to whole numbers where the picture's are."""
     values = values.clip(0, 255)
-    return cast(Gray, np.rint(values).astype(np.uint8) if gray.dtype == np.uint8 else values.astype(np.float32))
+    return np.rint(values).astype(np.uint8) if pixels.dtype == np.uint8 else values.astype(np.float32)
 
 
-def _jpeg(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, quality: int) -> Gray:
-    whole = np.rint(gray).astype(np.uint8)
+def _jpeg(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, quality: int) -> Pixels:
+    whole = np.rint(pixels).astype(np.uint8)
     _, data = cv2.imencode(".jpg", whole, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    return cast(Gray, cv2.imdecode(data, cv2.IMREAD_GRAYSCALE))
+    return np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE if pixels.ndim == 2 else cv2.IMREAD_COLOR))
 
 
-def _noise(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, sigma: float) -> Gray:
-    return _like(gray + sigma * rng.standard_normal(gray.shape), gray)
+def _noise(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, sigma: float) -> Pixels:
+    return _like(pixels + sigma * rng.standard_normal(pixels.shape), pixels)
 
 
-def _brightness(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, factor: float) -> Gray:
-    return _like(gray * np.float64(factor), gray)
+def _brightness(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, factor: float) -> Pixels:
+    return _like(pixels * np.float64(factor), pixels)
 
 
-def _blur(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, sigma: float) -> Gray:
-    return cast(Gray, cv2.GaussianBlur(gray, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE))
+def _blur(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, sigma: float) -> Pixels:
+    return np.asarray(cv2.GaussianBlur(pixels, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE))
 
 
-def _shift(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, right: int, down: int) -> Gray:
+def _shift(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, right: int, down: int) -> Pixels:
     # What comes in from outside repeats the edge.
-    height, width = gray.shape
+    height, width = pixels.shape[:2]
     rows = np.clip(np.arange(height) - down, 0, height - 1)
     columns = np.clip(np.arange(width) - right, 0, width - 1)
-    return gray[np.ix_(rows, columns)]
+    return pixels[np.ix_(rows, columns)]
 
 
-def _resized(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, interpolation: int) -> Gray:
-    """The picture fitted to its square as `fit_image` does it, but by another filter."""
-    height, width = gray.shape
+def _resized(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, interpolation: int) -> Pixels:
+    """Grey levels fitted to their square as `fit_image` does it, but by another filter."""
+    if pixels.ndim == 3:
+        return pixels
+    height, width = pixels.shape
     side = spec.image_size
     if spec.fit == "squash":
         height, width = side, side
@@ -322,8 +340,8 @@ def _resized(gray: Gray, spec: DescriptorSpec, rng: np.random.Generator, *, inte
         scale = max(side / height, side / width)
         height, width = int(scale * height + 0.5), int(scale * width + 0.5)
     top, left = (height - side) // 2, (width - side) // 2
-    whole = cv2.resize(gray, (width, height), interpolation=interpolation)
-    return _like(whole[top : top + side, left : left + side], gray)
+    whole = cv2.resize(pixels, (width, height), interpolation=interpolation)
+    return _like(whole[top : top + side, left : left + side], pixels)
 
 
 CHANGES = (

@@ -35,6 +35,7 @@ def decode(
     *,
     method: str = HOHMM,
     words: Path | str | None = None,
+    network: Path | str | None = None,
     out: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     options: Decoding = AS_LEARNED,
@@ -46,10 +47,11 @@ def decode(
     """`placerec decode`: the beliefs over every sequence that `sources` name, written to the folder `out` if given.
 
     `sources`: token streams, or image sources (`source_options`), whose words come from `words` (a words.npz; by
-    default that in `model`). Without `out` there must be one sequence only; explanations are written there, as
-    NAME.explain.jsonl. `method`: one of `METHODS`. `cache`: see `placerec.vision.describe`. Labelled sequences that
-    trained words or models are named in a warning, and so are labels that the models do not know. Raises ModelError or
-    StreamError for what cannot be read or does not belong together.
+    default that in `model`; `network`: the file of the image network, for words of one). Without `out` there must be
+    one sequence only; explanations are written there, as NAME.explain.jsonl. `method`: one of `METHODS`. `cache`: see
+    `placerec.vision.describe`. Labelled sequences that trained words or models are named in a warning, and so are
+    labels that the models do not know. Raises ModelError or StreamError for what cannot be read or does not belong
+    together.
     """
 
     check_method(method, options, scorer=scorer)
@@ -58,7 +60,7 @@ def decode(
         models = load_model(model)
         own = models.folder.words
         path = words or (own if own.exists() and are_images(sources) else None)
-        dictionary = None if path is None else _dictionary_for(sources, path)
+        dictionary = None if path is None else _dictionary_for(sources, path, network)
         decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
         if dictionary is None:
             streams, maker = token_streams(sources, models), dictionary_of(stream_files(sources))
@@ -101,7 +103,7 @@ def _write(
         write_text(folder / f"{stream.name}{EXPLAINED}", "".join(decisions))
 
 
-def _dictionary_for(sources: Sequence[Path | str], path: Path | str) -> "DictionarySet":
+def _dictionary_for(sources: Sequence[Path | str], path: Path | str, network: Path | str | None) -> "DictionarySet":
     """The dictionaries in `path`, for sources that are to be images."""
     # Only images need OpenCV and scipy.
     from placerec.vision import DictionarySet
@@ -109,7 +111,7 @@ def _dictionary_for(sources: Sequence[Path | str], path: Path | str) -> "Diction
     for source in sources:
         if is_stream(Path(source)):
             raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {path} out")
-    return DictionarySet.load(path)
+    return DictionarySet.load(path, network=network)
 
 
 def are_images(sources: Sequence[Path | str]) -> bool:

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -17,7 +18,6 @@ from placerec.frames import Frame, Sequence, SourceOptions, find_sequences
 from placerec.frames.camera import Camera
 from placerec.frames.images import all_images
 from placerec.frames.live import LatestFrameQueue, LiveFrame, Stopped, ended_by_interrupt, real_time
-from placerec.frames.sequence import gray_levels
 from placerec.hohmm import Belief, SequenceDecoder, format_header
 from placerec.hohmm.decoder import Distances, Words
 from placerec.methods.decode import format_belief
@@ -70,6 +70,7 @@ def decode_live(
     model: Path | str,
     *,
     words: Path | str | None = None,
+    network: Path | str | None = None,
     method: str = HOHMM,
     source_options: SourceOptions = SourceOptions(),
     options: Decoding = AS_LEARNED,
@@ -79,7 +80,8 @@ def decode_live(
     """`placerec decode --live`: the lines of a beliefs file, each as soon as its frame has come; TSV with a header.
 
     `source`: a camera, or a sequence whose frames have times, which is played at its own pace. See `follow_live`.
-    `words`: the words.npz, by default that in `model`. `method`: one of `METHODS`. Raises ModelError for options that
+    `words`: the words.npz, by default that in `model`; `network`: the file of the image network, for words of one.
+    `method`: one of `METHODS`. Raises ModelError for options that
     look ahead or write files, and StreamError unless `source` is one sequence of images.
     """
     sequence, dictionary, decoder = open_live(
@@ -112,7 +114,7 @@ def open_live(
     if is_stream(Path(source)):
         raise StreamError(f"{source}: is a token stream, and live decoding is of images; name a camera or a video")
     models = load_model(model)
-    dictionary = DictionarySet.load(words or models.folder.words)
+    dictionary = DictionarySet.load(words or models.folder.words, network=network)
     decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
     sequences = find_sequences([source], options=source_options, endless=True)
     if len(sequences) > 1:
@@ -148,8 +150,13 @@ def follow_live(
     """
     tally = _Tally(sequence)
     # Filters are made when they are first needed: not while the first frames wait.
-    dictionary.words_of(_ANY)
-    with closing(LatestFrameQueue(lambda stopped: _live_frames(sequence, stopped))) as queue, ended_by_interrupt(queue):
+    colours = dictionary.spec.colours
+    dictionary.words_of(np.dstack([_ANY] * 3) if colours else _ANY)
+    frames = partial(_live_frames, sequence, colours)
+    with (
+        closing(LatestFrameQueue(frames)) as queue,
+        ended_by_interrupt(queue),
+    ):
         try:
             for live in queue:
                 if see is not None:
@@ -169,10 +176,10 @@ def follow_live(
                 tell(report)
 
 
-def _live_frames(sequence: Sequence, stopped: Stopped) -> Iterator[LiveFrame]:
+def _live_frames(sequence: Sequence, colours: bool, stopped: Stopped) -> Iterator[LiveFrame]:
     if isinstance(sequence.recording, Camera):
-        return sequence.recording.live_frames(stopped)
-    return real_time(all_images(sequence), stopped)
+        return sequence.recording.live_frames(stopped, colours=colours)
+    return real_time(all_images(sequence, colours=colours), stopped)
 
 
 def _believed(
@@ -182,7 +189,7 @@ def _believed(
     try:
         if isinstance(image, str):
             raise VisionError(image)
-        words, distances = dictionary.words_of(gray_levels(image))
+        words, distances = dictionary.words_of(image)
     except VisionError as error:
         tally.unusable(error)
         decoder.skip()

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Singles
 from placerec.errors import VisionError, counted
-from placerec.frames.sequence import Gray
+from placerec.frames.sequence import Image
 from placerec.jobs import Executor
 from placerec.version import __version__
 from placerec.vision.chunks import Source, spooled
@@ -122,16 +123,16 @@ class Dictionary:
         codes = project(rows_to_look_up(descriptors, self.spec), self.pca)
         return map_quality(codes, self.codebook, self.hits)
 
-    def word_of(self, image: Gray) -> tuple[str, float]:
-        """The word of one grey image (h, w) of 0..255, and its distance from the word's unit in PCA space.
+    def word_of(self, image: Image | NDArray[Any]) -> tuple[str, float]:
+        """The word of one image (`spec.descriptor`), and its distance from the word's unit in PCA space.
 
         Raises VisionError for an image that cannot be used.
         """
         units, distances = self.words(descriptor(image, self.spec)[None])
         return self.vocabulary[int(units[0])], float(distances[0])
 
-    def words_of(self, image: Gray) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """The word of one grey image and its distance, as `DictionarySet.words_of` gives them for several."""
+    def words_of(self, image: Image | NDArray[Any]) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """The word of one image and its distance, as `DictionarySet.words_of` gives them for several."""
         word, distance = self.word_of(image)
         return (word,), (distance,)
 

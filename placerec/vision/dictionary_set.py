@@ -8,9 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from placerec.arrays import Ints, Singles
 from placerec.errors import VisionError
-from placerec.frames.sequence import Gray
+from placerec.frames.sequence import Image
 from placerec.jobs import Executor
 from placerec.vision.chunks import Source, SpooledRows, spooled
 from placerec.vision.describe import Descriptors
@@ -120,7 +122,7 @@ class DictionarySet:
         """What a frame's descriptor is: those of all dictionaries, joined in the order of the dictionaries."""
         settings: dict[str, Any] = {}
         for one in self.dictionaries:
-            settings |= one.spec.as_dict()
+            settings |= {name: getattr(one.spec, name) for name in one.spec.settings}
         kinds = dict.fromkeys(kind for one in self.dictionaries for kind in one.spec.kinds)
         return DescriptorSpec(**{**settings, "kind": "+".join(kinds)})
 
@@ -146,8 +148,8 @@ class DictionarySet:
             found |= zip((one.name for one in dictionaries), answers, strict=True)
         return tuple(found[name] for name in self.names)
 
-    def words_of(self, image: Gray) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """The words of one grey image (h, w) of 0..255, one for every dictionary, and the distances from their units.
+    def words_of(self, image: Image | NDArray[Any]) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """The words of one image (`spec.descriptor`), one for every dictionary, and the distances from their units.
 
         Raises VisionError for an image that cannot be used.
         """
@@ -174,9 +176,17 @@ class DictionarySet:
         write_dictionaries(Path(path), self.dictionaries, self.spec)
 
     @classmethod
-    def load(cls, path: Path | str) -> "DictionarySet":
-        """Read and check a words.npz of one dictionary or of several; VisionError as `Dictionary.load` says."""
-        return cls(read_dictionaries(Path(path)))
+    def load(cls, path: Path | str, *, network: Path | str | None = None) -> "DictionarySet":
+        """Read and check a words.npz of one dictionary or of several; VisionError as `Dictionary.load` says.
+
+        `network`: the file of the image network that the words are of; without it no image can be described.
+        VisionError for another network, and where there is none.
+        """
+        found = read_dictionaries(Path(path))
+        if network is None:
+            return cls(found)
+        spec = cls(found).spec.with_network(network)
+        return cls(tuple(replace(one, spec=spec.part(*one.spec.kinds)) for one in found))
 
 
 def _fit_part(

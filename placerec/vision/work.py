@@ -15,15 +15,15 @@ import numpy as np
 from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import SourceError, VisionError, counted
 from placerec.files import content_digest
-from placerec.frames import Frame, Sequence as FrameSequence, read_gray
+from placerec.frames import Frame, Sequence as FrameSequence
+from placerec.frames.image import read_image
 from placerec.frames.images import Batch, batches, content_key, with_images
-from placerec.frames.sequence import Gray, Image, gray_levels
+from placerec.frames.sequence import Image
 from placerec.frames.table import FrameTable
 from placerec.jobs import Executor, Progress, RemoteExecutor, workers
 from placerec.journal import Cache, Journal
 from placerec.version import __version__
-from placerec.vision.images import check_gray, fit_image
-from placerec.vision.spec import DescriptorSpec, describer, descriptor
+from placerec.vision.spec import DescriptorSpec, Fitted, check_describable, describe_parts, descriptor, fit_parts
 from placerec.vision.storage import Arrays
 
 log = logging.getLogger(__name__)
@@ -96,12 +96,14 @@ def describe_batch(spec: DescriptorSpec, batch: Batch) -> BatchResult:
     return BatchResult(np.array(kept, np.int64), np.asarray(blank), tuple(reasons), {"values": values})
 
 
-def describe_frame(frame: Frame, image: Image | str | None, spec: DescriptorSpec) -> Singles | str:
-    """A frame's descriptor, or the reason why there is none; `image`: None if it is still in its file."""
+def describe_frame(frame: Frame, image: Fitted | Image | str | None, spec: DescriptorSpec) -> Singles | str:
+    """A frame's descriptor, or the reason why there is none; `image`: perhaps fitted, None if still in its file."""
     if isinstance(image, str):
         return image
     try:
-        return descriptor(read_gray(frame.path) if image is None else gray_levels(image), spec)
+        if isinstance(image, tuple):
+            return describe_parts(image, spec)
+        return descriptor(read_image(frame.path, colours=spec.colours) if image is None else image, spec)
     except SourceError as error:
         return str(error)
     except VisionError as error:
@@ -130,7 +132,7 @@ def process_batches(
     that was cut short, and keeps the others. `cache`: the folder where descriptors are kept for other runs, and taken
     from. `progress` is called with frames done and in all, 0 for a camera.
     """
-    describer(spec)
+    check_describable(spec)
     endless = any(sequence.recording is not None and sequence.recording.endless for sequence in sequences)
     # Ctrl-C ends what a camera records, and would end other processes.
     work = workers() if endless or work is None else work
@@ -187,7 +189,7 @@ def _found(
     journal: Journal | None,
     cache: Cache | None,
 ) -> Iterator[tuple[Batch, BatchResult]]:
-    listed = batches(sequences)
+    listed = batches(sequences, colours=step.spec.colours)
 
     def key_of(what: str, sequence: FrameSequence, batch: Batch) -> bytes:
         return bytes.fromhex(content_digest(what, __version__, step.spec.as_dict(), content_key(sequence, batch)))
@@ -211,7 +213,7 @@ def _found(
             pending.append((shown, key_of(key, sequence, batch) if journal is not None else b"", kept_as))
             yield sequence, batch if known is None else replace(batch, known=known)
 
-    given = with_images(handed_out(), lambda image: _shrunk(image, step.spec))
+    given = with_images(handed_out(), lambda image: _shrunk(image, step.spec), colours=step.spec.colours)
     for result in work(step, map(_absolute, given) if isinstance(work, RemoteExecutor) else given):
         batch, key_of_batch, kept_as = pending.popleft()
         # What could not be read is tried again by the next run.
@@ -229,12 +231,11 @@ def _absolute(batch: Batch) -> Batch:
     return replace(batch, frames=tuple(replace(frame, path=frame.path.absolute()) for frame in batch.frames))
 
 
-def _shrunk(image: Image | str, spec: DescriptorSpec) -> Gray | str:
-    """The image as it is fitted for its descriptor, which is the first that is done to it anyway."""
+def _shrunk(image: Image | str, spec: DescriptorSpec) -> Fitted | Image | str:
+    """The image as it is fitted for its descriptors, which is the first that is done to it anyway."""
     if isinstance(image, str):
         return image
-    gray = gray_levels(image)
     try:
-        return fit_image(check_gray(gray), spec.image_size, spec.fit)
+        return fit_parts(image, spec)
     except VisionError:
-        return gray  # and what describes it says why
+        return image  # and what describes it says why

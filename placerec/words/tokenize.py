@@ -32,6 +32,7 @@ def tokenize(
     out: Path | str,
     *,
     matrix: Path | str | None = None,
+    network: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     work: Executor | None = None,
     cache: Path | str | None = None,
@@ -41,11 +42,12 @@ def tokenize(
 
     The sources may be files of `placerec describe` (.npz), all of them, in place of images. `words`: the words.npz to
     use. `matrix`: the frames' descriptors, for a dictionary of descriptors that were computed elsewhere (`describe`).
+    `network`: the file of the image network, for a dictionary of one (`DictionarySet.load`).
     `work`: who does the work (`jobs.workers`), None for threads; the bytes do not depend on it. `cache`: see
     `describe`. Only some frames at a time are in memory; after a run that was killed or interrupted the next one goes
     on from there.
     """
-    dictionaries = DictionarySet.load(Path(words))
+    dictionaries = DictionarySet.load(Path(words), network=network)
     # The folder comes first: that it cannot be written must not be found out after an hour of images.
     with whole_folder(Path(out), OWNED) as folder, open_journal(Path(out)) as journal:
         parts = _parts(sources, dictionaries, matrix, source_options, work, journal, cache, progress)

@@ -83,3 +83,18 @@ def write_images(folder: Path, seed: int = 0, frames: int = 12) -> Path:
         labels.append(f"{name} {place}\n")
     (folder / "localization" / "places.lst").write_text("".join(labels), encoding="utf-8")
     return folder
+
+
+def write_coloured(folder: Path, seed: int = 0, frames: int = 16) -> Path:
+    """A sequence of COLD's layout: two places of the same grey levels, that only the colours of patches tell apart."""
+    write_images(folder, seed, frames)
+    rng = np.random.default_rng([seed, 1])
+    for number, path in enumerate(sorted((folder / "std_cam").iterdir())):
+        y, x = np.mgrid[:24, :32]
+        waves = 40 * np.sin(x * (0.5 + rng.random())) + rng.normal(0, 6, y.shape)
+        warm = (x < 16) ^ (y < 12) if number < frames // 2 else x < 16
+        # Of the luma 0.
+        tint = np.where(warm[..., None], (-60, -19, 60), (60, 19, -60))
+        picture = (127 + waves[..., None] + tint).clip(0, 255).astype(np.uint8)
+        assert cv2.imwrite(str(path), picture)
+    return folder

@@ -55,7 +55,7 @@ def test_nothing_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     frames_of(tmp_path, 5)
     sequences = find_sequences([tmp_path / "run"])
     plain = describe(sequences, SPEC, cache=tmp_path / "kept")
-    monkeypatch.setattr("placerec.vision.work.read_gray", lambda path: pytest.fail("an image was read"))
+    monkeypatch.setattr("placerec.vision.work.read_image", lambda path, **how: pytest.fail("an image was read"))
     np.testing.assert_array_equal(describe(sequences, SPEC, cache=tmp_path / "kept").values, plain.values)
 
 

@@ -10,7 +10,11 @@ from placerec.cli.shared.common import (
     words_option as words_option,
 )
 from placerec.cli.shared.decoding import decoding_options as decoding_options
-from placerec.cli.shared.descriptors import descriptor_options as descriptor_options, matrix_option as matrix_option
+from placerec.cli.shared.descriptors import (
+    descriptor_options as descriptor_options,
+    matrix_option as matrix_option,
+    network_option as network_option,
+)
 from placerec.cli.shared.groups import command as command
 from placerec.cli.shared.models import SMOOTHING_NAMES as SMOOTHING_NAMES, model_options as model_options
 from placerec.cli.shared.pages import live_page_options as live_page_options, page_options as page_options

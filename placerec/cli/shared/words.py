@@ -7,6 +7,7 @@ import click
 
 from placerec.cli.shared import groups
 from placerec.cli.shared.common import seed_option
+from placerec.cli.shared.descriptors import take_network
 from placerec.cli.shared.values import Command, FiniteRange, listed
 
 
@@ -16,7 +17,7 @@ def _views(ctx: click.Context, param: click.Parameter, value: str) -> tuple[str,
     from placerec.errors import VisionError
     from placerec.vision.options import View
 
-    views = listed(click.STRING)(ctx, param, value)
+    views = tuple(take_network(ctx, param, view) for view in listed(click.STRING)(ctx, param, value))
     for view in views:
         try:
             View.parse(view)
