@@ -81,11 +81,18 @@ def decode_live(
 
     `source`: a camera, or a sequence whose frames have times, which is played at its own pace. See `follow_live`.
     `words`: the words.npz, by default that in `model`; `network`: the file of the image network, for words of one.
-    `method`: one of `METHODS`. Raises ModelError for options that
-    look ahead or write files, and StreamError unless `source` is one sequence of images.
+    `method`: one of `METHODS`. Raises ModelError for options that look ahead or write files, and StreamError unless
+    `source` is one sequence of images.
     """
     sequence, dictionary, decoder = open_live(
-        source, model, words=words, method=method, source_options=source_options, options=options, scorer=scorer
+        source,
+        model,
+        words=words,
+        network=network,
+        method=method,
+        source_options=source_options,
+        options=options,
+        scorer=scorer,
     )
     header = None if as_json else format_header(decoder.places, unknown=decoder.asks_unknown)
     with closing(follow_live(sequence, dictionary, decoder)) as answers:
@@ -101,6 +108,7 @@ def open_live(
     model: Path | str,
     *,
     words: Path | str | None,
+    network: Path | str | None,
     method: str,
     source_options: SourceOptions,
     options: Decoding,

@@ -45,6 +45,7 @@ def decode_live_page(
     host: str = HERE,
     port: int = 0,
     words: Path | str | None = None,
+    network: Path | str | None = None,
     method: str = HOHMM,
     source_options: SourceOptions = SourceOptions(),
     options: Decoding = AS_LEARNED,
@@ -59,7 +60,14 @@ def decode_live_page(
     see `decode_live` and `PageServer`.
     """
     sequence, dictionary, decoder = open_live(
-        source, model, words=words, method=method, source_options=source_options, options=options, scorer=scorer
+        source,
+        model,
+        words=words,
+        network=network,
+        method=method,
+        source_options=source_options,
+        options=options,
+        scorer=scorer,
     )
 
     def make() -> SequenceDecoder:

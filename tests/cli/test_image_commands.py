@@ -107,9 +107,18 @@ def test_a_matrix_goes_all_the_way(world: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--descriptor", "sift"), "'sift' is not one of gist, lbp, ranks, centrist, npy:FILE"),
-        (("--descriptor", "npy:"), "'npy:' is not one of gist, lbp, ranks, centrist, npy:FILE"),
-        (("--descriptor", "npy"), "'npy' is not one of gist, lbp, ranks, centrist, npy:FILE"),
+        (
+            ("--descriptor", "sift"),
+            "'sift' is not one of gist, lbp, ranks, centrist, colour, onnx:FILE",
+        ),
+        (
+            ("--descriptor", "npy:"),
+            "'npy:' is not one of gist, lbp, ranks, centrist, colour, onnx:FILE",
+        ),
+        (
+            ("--descriptor", "npy"),
+            "'npy' is not one of gist, lbp, ranks, centrist, colour, onnx:FILE",
+        ),
         (("--descriptor", "centrist", "--variant", "lmgist"), "--variant says nothing about centrist descriptors"),
         (
             ("--descriptor", "npy:a.npy", "--image-size", 64),
