@@ -195,6 +195,22 @@ def test_paper_gets_the_still_picture(page: Any) -> None:
         page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
 
+def test_a_drive_of_hours_is_stepped_through(browser: Any, tmp_path: Path) -> None:
+    """More frames than a call in JavaScript can have arguments."""
+    n = 150_000
+    truth = [PLACES[k // 700 % 2] for k in range(n)]
+    decided = ["office" if k == 140_000 else place for k, place in enumerate(truth)]
+    (tmp_path / "r.html").write_text(
+        report_page("r", [Drive("long", {"": beliefs_of("long", PLACES, truth, decided)})])
+    )
+    browser.get((tmp_path / "r.html").as_uri())
+    assert moment(browser) == "long, frame 140000"
+    press(browser, "c")
+    press(browser, "p")
+    assert moment(browser) == "long, frame 139300"
+    assert complaints(browser) == []
+
+
 def test_frames_words_and_reasons_of_a_real_model_are_shown(browser: Any, tmp_path: Path) -> None:
     root = write_decoded_images(tmp_path)
     report([root / "beliefs"], root / "r.html", frames=[root / "runs"], words=root / "words.npz")

@@ -89,12 +89,10 @@ export function meantFrames(drive, kind, a, b, place) {
 
 // The moments to step through, [drive number, frame]: where runs of meant frames begin, or the least sure ones.
 export function momentsOf(data, kind, a, b, place) {
-  const found = [];
-  data.drives.forEach((drive, number) => {
+  const found = data.drives.flatMap((drive, number) => {
     const frames = meantFrames(drive, kind, a, b, place);
-    if (kind === "all") found.push(...frames.map((frame) => [number, frame]));
-    else if (kind === "unsure") found.push(...leastSure(drive, data, a, frames).map((one) => [number, ...one]));
-    else found.push(...runStarts(drive, a, b, frames).map((frame) => [number, frame]));
+    if (kind === "unsure") return leastSure(drive, data, a, frames).map((one) => [number, ...one]);
+    return (kind === "all" ? frames : runStarts(drive, a, b, frames)).map((frame) => [number, frame]);
   });
   if (kind !== "unsure") return found;
   return found.sort((x, y) => x[2] - y[2]).slice(0, SURE).map(([number, frame]) => [number, frame]);
