@@ -280,6 +280,7 @@ def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         yield heading("Belief over time")
+        yield paragraph(f"{best}, seed 0, all folds. Point at a moment:")
         caption = f"The sequences with the most and the fewest frames right: {best}, seed 0."
         strips = folder / "strips.png"
         draw_strips(of[best], found[best], strips, 11)
