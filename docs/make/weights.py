@@ -1,10 +1,11 @@
 """The tables of docs/recognizer.md on several dictionaries and what their words weigh, and the results behind them.
 
-python docs/make/weights.py [DATA] [--set NAME ...] [--work DIR]
+python docs/make/weights.py [DATA] [--set NAME ...] [--seeds N] [--work DIR]
 
-With DATA, the folder of the sets, every fold of FOLDS is run for the seeds 0 to 2: METHODS by `placerec compare`, and
-VARIANTS of what `placerec learn` makes. What was done is kept in DIR, so that a run that was stopped goes on, and
-docs/recognizer/weights.csv gets all of it. Then the tables of the page are written anew, if there are all results.
+With DATA, the folder of the sets, every fold of FOLDS is run for the first seeds (0 to 2): METHODS by `placerec
+compare`, and VARIANTS of what `placerec learn` makes; METHODS also on the laboratory, which is rendered. What was done
+is kept in DIR, so that a run that was stopped goes on, and docs/recognizer/weights.csv gets all of it. Then the tables
+of the page are written anew.
 """
 
 import argparse
@@ -29,7 +30,8 @@ from placerec import learn
 from placerec.evaluation.metrics import evaluate
 from placerec.experiments.comparison.run import compare
 from placerec.experiments.grid.report import Table, markdown
-from placerec.files import write_text
+from placerec.files import content_digest, write_text
+from placerec.lab.layout import render_lab
 from placerec.methods import HOHMM, decode
 from placerec.model import Decoding, ModelOptions, train_lm
 from placerec.model.decoding import AS_LEARNED
@@ -37,7 +39,7 @@ from placerec.vision import DictionarySetOptions
 
 PAGE = Path(__file__).parents[1] / "recognizer.md"
 RESULTS = PAGE.with_suffix("") / "weights.csv"
-SEEDS = range(3)
+SEEDS = 3
 # Names of the sequences that test, fold by fold; all others of the set train.
 FOLDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "go2home": (("run03*", "run09*", "run15*", "run21*"), ("run05*", "run11*", "run17*", "run23*")),
@@ -50,9 +52,14 @@ FOLDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "multifloor": (("floor1",), ("floor2",), ("floor3",), ("floor4",)),
     "rtabmap_corridor": (("lap1",), ("lap2",)),
 }
+# The synthetic laboratory: the third run of every path and light tests, or all of one light.
+LIGHT: dict[str, tuple[tuple[str, ...], ...]] = {
+    "same light": (("*3",),),
+    "unseen light": (("*_cloudy*",), ("*_night*",), ("*_sunny*",)),
+}
 METHODS = (
-    *(HOHMM, f"{HOHMM}-single", f"{HOHMM}-paper", "rbf-svm-hmm", "rbf-svm", "logistic-hmm", "logistic", "knn"),
-    *("ullah2008-hmm", "ullah2008", "torralba2003", "rbf-svm-hmm@tuned", "rbf-svm-hmm@pn-tuned"),
+    *(HOHMM, f"{HOHMM}-single", f"{HOHMM}-paper", "rbf-svm-hmm", "rbf-svm", "rbf-svm-hmm@pn-tuned", "ullah2008-hmm"),
+    *("ullah2008", "knn"),
 )
 
 
@@ -77,12 +84,9 @@ VARIANTS = (
     Variant("alpha 1, memory 0", decoding=Decoding(alpha=1.0, memory=0.0)),
     Variant("memory 0", decoding=Decoding(memory=0.0)),
     Variant("fixed transitions", decoding=Decoding(transition="fixed", alpha=1.0, memory=0.0)),
-    Variant("size 10", {"sizes": (10,)}),
-    Variant("size 20", {"sizes": (20,)}),
-    Variant("sizes 15, 20", {"sizes": (15, 20)}),
-    Variant("sizes 10, 15, 20", {"sizes": (10, 15, 20)}),
-    Variant("view plain", {"views": ("plain",)}),
-    Variant("view pn", {"views": ("pn",)}),
+    Variant("sizes 10", {"sizes": (10,)}),
+    Variant("sizes 20", {"sizes": (20,)}),
+    Variant("views plain, pn of GIST alone", {"views": ("gist", "gist:pn")}),
     Variant("order 1", options=ModelOptions(1)),
     Variant("order 3", options=ModelOptions(3)),
     Variant("lidstone", options=ModelOptions(2, "lidstone")),
@@ -104,6 +108,13 @@ class Result(NamedTuple):
     change_latency_frames: float | None
 
 
+NOTES = {
+    "method": "Per cent of the frames right, ECE and log loss ({seeds}): means over the folds of a set with their "
+    "frames as weights, then over sets, of which the standard deviation is over seeds.",
+    "variant": "Learned otherwise than by default, or with something of what was learned left out ({seeds}):",
+    "light": "On the **synthetic** laboratory, tested on the third run of every path and light, and on one light after "
+    "the other that no training sequence has ({seeds}):",
+}
 # What is measured, by name.
 Figures = dict[str, Any]
 MEASURED = Result._fields[5:]
@@ -119,9 +130,9 @@ def compared(training: Sequence[Path], tests: Sequence[Path], seed: int, work: P
 
 
 def varied(
-    training: Sequence[Path], tests: Sequence[Path], seed: int, variants: Iterable[Variant], folder: Path
+    training: Sequence[Path], tests: Sequence[Path], seed: int, variants: Iterable[Variant], cache: Path, folder: Path
 ) -> dict[str, Figures]:
-    """The figures of some variants that learn alike, in a `folder` for models and beliefs."""
+    """The figures of some variants that learn alike; `cache`: of descriptors, `folder`: for models and beliefs."""
     figures, model, short = {}, folder / "model", folder / "short"
     for variant in variants:
         if not model.exists():
@@ -130,11 +141,13 @@ def varied(
                 model,
                 words=replace(DictionarySetOptions(seed=seed), **variant.words),
                 options=variant.options,
+                cache=cache,
             )
         if variant.short:
             train_lm([model / "tokens"], short, options=variant.options)
         used = short if variant.short else model
-        beliefs = decode(tests, used, words=model / "words.npz", out=folder / "beliefs", options=variant.decoding)
+        words, out = model / "words.npz", folder / "beliefs"
+        beliefs = decode(tests, used, words=words, out=out, options=variant.decoding, cache=cache)
         figures[variant.name] = {name: getattr(evaluate(beliefs), name) for name in MEASURED}
     return figures
 
@@ -149,23 +162,32 @@ def kept(path: Path, work: Callable[[], dict[str, Figures]]) -> dict[str, Figure
     return done
 
 
-def run(data: Path, sets: Sequence[str], work: Path) -> Iterator[Result]:
-    """The results of all folds and seeds of some sets."""
-    for name in sets:
-        sequences = sorted(path for path in (data / name).iterdir() if path.is_dir())
-        for seed in SEEDS:
-            for number, globs in enumerate(FOLDS[name]):
+def run(data: Path, sets: Sequence[str], seeds: Iterable[int], work: Path) -> Iterator[Result]:
+    """The results of all folds of some sets, or of the laboratory in the `work` folder with some light."""
+    for seed in seeds:
+        for name in sets:
+            own_data = laboratory(work) if name in LIGHT else data / name
+            sequences = sorted(path for path in own_data.iterdir() if path.is_dir())
+            for number, globs in enumerate((FOLDS | LIGHT)[name]):
                 tests = [path for glob in globs for path in sequences if path.match(glob)]
                 training = [path for path in sequences if path not in tests]
                 own = work / name / f"seed{seed}-fold{number}"
                 found = kept(own / "compare.json", partial(compared, training, tests, seed, own))
                 yield from (Result("method", one, name, number, seed, **of) for one, of in found.items())
-                for at, (_, same) in enumerate(groupby(VARIANTS, attrgetter("words", "options"))):
+                for _, same in groupby(() if name in LIGHT else VARIANTS, attrgetter("words", "options")):
+                    alike = list(same)
                     with tempfile.TemporaryDirectory() as folder:
-                        varying = partial(varied, training, tests, seed, same, Path(folder))
-                        found = kept(own / f"variants{at}.json", varying)
+                        varying = partial(varied, training, tests, seed, alike, own.parent / "cache", Path(folder))
+                        found = kept(own / f"{content_digest(repr(alike))[:16]}.json", varying)
                     yield from (Result("variant", one, name, number, seed, **of) for one, of in found.items())
-                sys.stderr.write(f"{name}: seed {seed}, fold {number + 1} of {len(FOLDS[name])}\n")
+                sys.stderr.write(f"{name}: seed {seed}, fold {number + 1}\n")
+
+
+def laboratory(work: Path) -> Path:
+    """The laboratory, which is rendered if it is not there."""
+    if not (work / "laboratory").exists():
+        render_lab(work / "laboratory", scale="small")
+    return work / "laboratory"
 
 
 def format_results(results: Iterable[Result]) -> str:
@@ -207,9 +229,9 @@ def of_set(results: Iterable[Result], figure: str) -> np.ndarray:
     return np.array([value / frames for _, (value, frames) in sorted(sums.items())])
 
 
-def table(results: Sequence[Result], kind: str) -> Table:
+def table(results: Sequence[Result], kind: str, sets: Iterable[str]) -> Table:
     """A line for each method or variant: accuracy, ECE and log loss on each set, and their means over sets."""
-    sets = list(dict.fromkeys(one.set for one in results))
+    sets = [name for name in sets if any(one.set == name for one in results)]
     lines = []
     for name in dict.fromkeys(one.name for one in results if one.kind == kind):
         own = {of: [one for one in results if (one.kind, one.name, one.set) == (kind, name, of)] for of in sets}
@@ -225,12 +247,22 @@ def table(results: Sequence[Result], kind: str) -> Table:
 
 
 def _spread(seeds: np.ndarray, digits: int) -> str:
-    return f"{seeds.mean():.{digits}f} ± {seeds.std(ddof=1):.{digits}f}"
+    spread = f" ± {seeds.std(ddof=1):.{digits}f}" if len(seeds) > 1 else ""
+    return f"{seeds.mean():.{digits}f}{spread}"
 
 
 def tables(results: Sequence[Result]) -> dict[str, str]:
     """What belongs between the marks of the page, by name."""
-    return {f"weights {kind}s": markdown(table(results, kind)) for kind in ("method", "variant")}
+    seeds = len({one.seed for one in results})
+    with_seeds = f"seed{'s' * (seeds > 1)} 0{f' to {seeds - 1}' * (seeds > 1)}"
+    made = {
+        f"weights {kind}s": f"{NOTES[kind].format(seeds=with_seeds)}\n\n{markdown(table(results, kind, FOLDS))}"
+        for kind in ("method", "variant")
+    }
+    head, lines = table(results, "method", LIGHT)
+    # A mean over both says nothing.
+    light = markdown((head[:-1], [line[:-1] for line in lines]))
+    return made | {"weights light": f"{NOTES['light'].format(seeds=with_seeds)}\n\n{light}"}
 
 
 def filled(page: str, made: Mapping[str, str]) -> str:
@@ -241,12 +273,15 @@ def filled(page: str, made: Mapping[str, str]) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", metavar="DATA", nargs="?", type=Path, help="the folder of the sets")
-    parser.add_argument("--set", action="append", choices=FOLDS, help="run this one only, and leave page and csv alone")
+    parser.add_argument(
+        "--set", action="append", choices=[*FOLDS, *LIGHT], help="run this one only, and leave page and csv alone"
+    )
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="how many")
     parser.add_argument("--work", metavar="DIR", type=Path, default=Path("weights-work"), help="what is kept of runs")
     options = parser.parse_args()
     logging.getLogger("placerec").setLevel(logging.ERROR)
     if options.data:
-        made = list(run(options.data, options.set or list(FOLDS), options.work))
+        made = list(run(options.data, options.set or [*FOLDS, *LIGHT], range(options.seeds), options.work))
         if options.set:
             sys.stdout.write("\n".join(tables(made).values()))
             sys.exit()
