@@ -41,6 +41,7 @@ def smoothed(counts: Mapping[Ngram, int], vocabulary: Sequence[str], order: int,
             "witten-bell": (T, N + T, 0.0),
             "lidstone": (delta * V, N + delta * V, -delta),
             "absolute": (delta * T, N, delta),
+            "jelinek-mercer": (N, 2 * N, 0.0),
         }[name.removesuffix("-backoff")]
         if name.endswith("-backoff"):
             seen = {word: (c - off) / whole for word, c in after[h].items()}

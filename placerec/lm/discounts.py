@@ -67,6 +67,16 @@ def lidstone(delta: float) -> Discount:
     return shared
 
 
+def jelinek_mercer(weights: Floats, bins_of: Callable[[Floats], Ints]) -> Discount:
+    """Jelinek & Mercer 1980: the relative frequency has a weight, by how often the context was seen."""
+
+    def shared(count: Floats, context: Context, V: int) -> tuple[Floats, Floats]:
+        weight = weights[bins_of(context.total)]
+        return weight, 1 - weight
+
+    return shared
+
+
 def absolute(discount: float) -> Discount:
     """Ney's absolute discounting: a constant, cut to 0..1, is taken off every count."""
     off = min(1.0, max(0.0, discount))

@@ -3,7 +3,7 @@
 Names without `-backoff` are interpolated. Their SRILM options stand in `SRILM_OPTIONS`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -17,6 +17,7 @@ from placerec.lm.discounts import (
     absolute,
     additive,
     counts_of_counts,
+    jelinek_mercer,
     kneser_ney_discount,
     left_neighbour_counts,
     lidstone,
@@ -26,6 +27,9 @@ from placerec.lm.discounts import (
 )
 
 T = TypeVar("T")
+
+# The one that looks at sentences, too.
+JELINEK_MERCER = "jelinek-mercer"
 
 # What an order's counts and discount become: (counts, order, words that are predicted) -> (counts, discount).
 Fit = Callable[[NgramCounts, int, Mask], tuple[NgramCounts, Discount]]
@@ -48,12 +52,13 @@ class Smoothing:
         return f"Smoothing({self.name!r}{delta})"
 
 
-def smoothing(name: str, delta: float | None = None) -> Smoothing:
+def smoothing(name: str, delta: float | None = None, sentences: Sequence[Sequence[str]] = ()) -> Smoothing:
     """The smoothing of that name (SMOOTHINGS lists them).
 
     `delta`: what the lidstone ones add to every count (default 1, above 0), or what the absolute ones take off
-    (default 0.5, above 0 and at most 1). Raises LanguageModelError for an unknown name, or a delta that leaves unseen
-    words without probability.
+    (default 0.5, above 0 and at most 1). `sentences`: those that are counted, which jelinek-mercer holds out in turn to
+    find its weights; without any they are 1/2. Raises LanguageModelError for an unknown name, or a delta that leaves
+    unseen words without probability.
     """
     if name not in SMOOTHINGS:
         raise LanguageModelError(f"smoothing {name!r} is unknown; choose one of {', '.join(SMOOTHINGS)}")
@@ -62,6 +67,8 @@ def smoothing(name: str, delta: float | None = None) -> Smoothing:
     if not 0 < delta < float("inf") or (base == "absolute" and delta > 1):
         bounds = "above 0 and at most 1" if base == "absolute" else "above 0"
         raise LanguageModelError(f"delta {delta:g} must be a number {bounds}: it is what unseen words live on")
+    if name == JELINEK_MERCER:
+        return Smoothing(name, _jelinek_mercer(sentences), True)
     return Smoothing(
         name, _FITS.get(name, _FITS[base])(delta), name == base, delta if base in ("lidstone", "absolute") else None
     )
@@ -74,6 +81,16 @@ def default_delta(name: str) -> float:
 
 def _fixed(discount: Discount) -> Fit:
     return lambda counts, n, predictable: (counts, discount)
+
+
+def _jelinek_mercer(sentences: Sequence[Sequence[str]]) -> Fit:
+    # Not needed by the others.
+    from placerec.lm.held_out import bins_of, held_out_weights
+
+    return lambda counts, n, predictable: (
+        counts,
+        jelinek_mercer(held_out_weights(counts, n, predictable, sentences), bins_of),
+    )
 
 
 def _kneser_ney(counts: NgramCounts, n: int, predictable: Mask) -> tuple[NgramCounts, Discount]:
@@ -135,5 +152,6 @@ SRILM_OPTIONS: dict[str, str | None] = {
     "kneser-ney-backoff": "-ukndiscount",
     "modified-kneser-ney": "-kndiscount -interpolate",
     "modified-kneser-ney-backoff": "-kndiscount",
+    JELINEK_MERCER: None,
 }
 SMOOTHINGS = tuple(SRILM_OPTIONS)

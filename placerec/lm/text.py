@@ -8,7 +8,7 @@ from placerec.files import read_lines
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.counts import count_ngrams
 from placerec.lm.estimation import estimate
-from placerec.lm.smoothings import smoothing as smoothing_named
+from placerec.lm.smoothings import JELINEK_MERCER, smoothing as smoothing_named
 from placerec.lm.vocabulary import SENTENCE_END
 
 
@@ -35,6 +35,9 @@ def train_ngrams(
         text = (line.split() for line in read_lines(Path(text), LanguageModelError))
     if order < 1:
         raise LanguageModelError(f"order {order} cannot be used; give 1 or more")
-    rule = smoothing_named(smoothing, delta)
+    held_out: Sequence[Sequence[str]] = ()
+    if smoothing == JELINEK_MERCER:
+        text = held_out = [*text]
+    rule = smoothing_named(smoothing, delta, held_out)
     counts = count_ngrams(text, order, vocabulary=vocabulary, markers=markers)
     return estimate(counts, rule, min_count=min_count, non_events=() if markers else (SENTENCE_END,))

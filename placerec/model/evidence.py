@@ -34,11 +34,15 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class PlaceCounts:
-    """What sequences tell of the places: the n-grams of each dictionary, frames, and steps from frame to frame."""
+    """What sequences tell of the places: the n-grams of each dictionary, frames, and steps from frame to frame.
+
+    `sentences`: those that were counted, where models are fitted to sentences.
+    """
 
     ngrams: Mapping[Key, NgramCounts] = field(repr=False)
     frames: Counter[str]
     steps: Counter[Route]
+    sentences: Mapping[Key, Sentences] = field(default_factory=dict, repr=False)
 
     @property
     def places(self) -> list[str]:
@@ -58,11 +62,13 @@ class PlaceCounts:
         """What all parts tell together; `parts` holds at least one."""
         keys = dict.fromkeys(key for part in parts for key in part.ngrams)
         ngrams = {key: add_counts(*(part.ngrams[key] for part in parts if key in part.ngrams)) for key in keys}
-        frames, steps = Counter[str](), Counter[Route]()
+        frames, steps, sentences = Counter[str](), Counter[Route](), dict[Key, Sentences]()
         for part in parts:
             frames.update(part.frames)
             steps.update(part.steps)
-        return PlaceCounts(ngrams, frames, steps)
+            for key, text in part.sentences.items():
+                sentences[key] = [*sentences.get(key, []), *text]
+        return PlaceCounts(ngrams, frames, steps, sentences)
 
 
 def count_places(
@@ -71,6 +77,7 @@ def count_places(
     """What labelled streams tell of the places; `vocabularies`: the words of each dictionary, by its name."""
     ngrams: dict[Key, NgramCounts] = {}
     waiting: dict[Key, Sentences] = {}
+    kept: dict[Key, Sentences] = {}
     frames, steps = Counter[str](), Counter[Route]()
     words = 0
 
@@ -78,6 +85,8 @@ def count_places(
         for key, text in waiting.items():
             counted = count_ngrams(text, options.order, vocabulary=vocabularies[key[0]], markers=options.markers)
             ngrams[key] = add_counts(ngrams[key], counted) if key in ngrams else counted
+            if options.holds_out:
+                kept[key] = [*kept.get(key, []), *text]
         waiting.clear()
 
     for stream in streams:
@@ -93,7 +102,7 @@ def count_places(
             count()
             words = 0
     count()
-    return PlaceCounts(ngrams, frames, steps)
+    return PlaceCounts(ngrams, frames, steps, kept)
 
 
 def held_out(
@@ -112,7 +121,10 @@ def held_out(
         return
     dictionaries = []
     for name, words in vocabularies.items():
-        models = [as_printed(estimate_place(training.ngrams[name, place], options)) for place in places]
+        keys = [(name, place) for place in places]
+        models = [
+            as_printed(estimate_place(training.ngrams[key], options, training.sentences.get(key, ()))) for key in keys
+        ]
         dictionaries.append(DictionaryModels(name, unite_models(models), frozenset(words)))
     steps, shares = training.step_counts(), shares_of(training.frame_counts())
     for stream in streams:

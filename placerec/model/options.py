@@ -1,10 +1,11 @@
 """How language models of places are made, and what says so: options, signatures, the equivalent SRILM commands."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from placerec.errors import ModelError
 from placerec.lm import BackoffModel, NgramCounts, estimate, smoothing, with_unigrams
-from placerec.lm.smoothings import SRILM_OPTIONS, default_delta
+from placerec.lm.smoothings import JELINEK_MERCER, SRILM_OPTIONS, default_delta
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN
 from placerec.version import __version__
 from placerec.words import Selection
@@ -40,6 +41,11 @@ class ModelOptions:
         """`delta`, or the default of the smoothing."""
         return default_delta(self.smoothing) if self.delta is None else self.delta
 
+    @property
+    def holds_out(self) -> bool:
+        """Whether the smoothing is fitted to sentences that are held out, so that their counts do not do."""
+        return self.smoothing == JELINEK_MERCER
+
     def signature(self, place: str, words: int, dictionary: str = "") -> str:
         """What made the model of a place over `words` words, of a further `dictionary`: the ARPA file's first line."""
         delta = f" delta={self.delta_used:g}" if self.smoothing.startswith(("lidstone", "absolute")) else ""
@@ -68,10 +74,13 @@ class ModelOptions:
         )
 
 
-def estimate_place(counts: NgramCounts, options: ModelOptions) -> BackoffModel:
-    """The language model of one place: V = all words of the counts' vocabulary."""
+def estimate_place(counts: NgramCounts, options: ModelOptions, sentences: Sequence[Sequence[str]] = ()) -> BackoffModel:
+    """The language model of one place: V = all words of the counts' vocabulary.
+
+    `sentences`: those that were counted, where `options.holds_out`.
+    """
     non_events = () if options.markers else (SENTENCE_END,)
-    rule = smoothing(options.smoothing, options.delta)
+    rule = smoothing(options.smoothing, options.delta, sentences)
     model = estimate(counts, rule, min_count=options.min_count, non_events=non_events)
     return with_unigrams(model, (UNKNOWN, SENTENCE_START, SENTENCE_END))
 

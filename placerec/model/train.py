@@ -179,7 +179,8 @@ def write_model(
         if not files.sentences.stat().st_size:
             log.warning("place %s: no visit holds a selected word; its model is uniform", place)
         try:
-            model = estimate_place(counted, options)
+            held_out = [*each_sentence(files.sentences)] if options.holds_out else []
+            model = estimate_place(counted, options, held_out)
         except LanguageModelError as error:
             raise LanguageModelError(f"place {place}: {error}") from error
         write_text(files.counts, format_counts(counted))

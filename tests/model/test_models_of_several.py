@@ -14,7 +14,7 @@ from placerec.evaluation.metrics import evaluate
 from placerec.hohmm.weights import ALPHAS, MEMORIES
 from placerec.inspection.decision import format_decision, inspect_decision
 from placerec.methods import decode, decode_lines, load_decoder
-from placerec.model import Decoding, calibrate, load_model, load_recognizer, train_lm, update
+from placerec.model import Decoding, ModelOptions, calibrate, load_model, load_recognizer, train_lm, update
 from placerec.model.evidence import group_borders
 from placerec.words import write_stream, write_vocabulary
 
@@ -53,8 +53,12 @@ def test_each_dictionary_has_the_models_that_its_column_alone_would_make(tmp_pat
     assert list(own["evidence"]["dictionaries"]) == ["word", "word.plain20", "word.pn10"]
 
 
-def test_weights_are_those_with_the_least_log_loss_on_runs_that_are_left_out(tmp_path: Path, runs: list[Path]) -> None:
-    train_lm(runs[:3], tmp_path / "model")
+@pytest.mark.parametrize("smoothing", ["witten-bell", "jelinek-mercer"])
+def test_weights_are_those_with_the_least_log_loss_on_runs_that_are_left_out(
+    tmp_path: Path, runs: list[Path], smoothing: str
+) -> None:
+    made = ModelOptions(smoothing=smoothing)
+    train_lm(runs[:3], tmp_path / "model", options=made)
     evidence = load_model(tmp_path / "model").description.evidence
     assert evidence is not None
     found = {}
@@ -62,7 +66,7 @@ def test_weights_are_those_with_the_least_log_loss_on_runs_that_are_left_out(tmp
         beliefs = []
         for left in range(3):
             rest = [run for number, run in enumerate(runs[:3]) if number != left]
-            train_lm(rest, tmp_path / "rest")
+            train_lm(rest, tmp_path / "rest", options=made)
             options = Decoding(transition="learned", alpha=alpha, memory=memory)
             beliefs += decode([runs[left]], tmp_path / "rest", options=options)
         found[alpha, memory] = evaluate(beliefs).log_loss

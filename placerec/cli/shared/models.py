@@ -9,10 +9,13 @@ from placerec.cli.shared import groups
 from placerec.cli.shared.values import Command, FiniteRange, usage
 
 # The names of placerec.lm.SMOOTHINGS, written out: --help would wait for numpy.
-SMOOTHING_NAMES = tuple(
-    name + suffix
-    for name in ("witten-bell", "lidstone", "absolute", "kneser-ney", "modified-kneser-ney")
-    for suffix in ("", "-backoff")
+SMOOTHING_NAMES = (
+    *(
+        name + suffix
+        for name in ("witten-bell", "lidstone", "absolute", "kneser-ney", "modified-kneser-ney")
+        for suffix in ("", "-backoff")
+    ),
+    "jelinek-mercer",
 )
 
 

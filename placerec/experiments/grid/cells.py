@@ -93,12 +93,13 @@ def believe_cell(job: CellJob, cell: GridCell) -> list[Beliefs]:
 
 @dataclass(frozen=True)
 class _Streams:
-    """The streams of a job, and per place the counts of n-grams of selected words, and of all words alone."""
+    """The streams of a job, and per place the counts of n-grams of selected words, and of all words (`whole`) alone."""
 
     corpus: Corpus
     training: list[WordStream]
     tests: list[WordStream]
     counts: list[NgramCounts]
+    whole: Corpus
     words: list[NgramCounts]
 
 
@@ -106,7 +107,7 @@ def _read(job: CellJob, cells: Sequence[GridCell]) -> _Streams:
     corpus = read_corpus(job.train, selection=parse_selection(job.select))
     whole = read_corpus(job.train, selection=Selection())
     counts = _counts(corpus, max(cell.order for cell in cells))
-    return _Streams(corpus, read_streams(job.train), read_streams(job.test), counts, _counts(whole, 1))
+    return _Streams(corpus, read_streams(job.train), read_streams(job.test), counts, whole, _counts(whole, 1))
 
 
 def _computed(job: CellJob, cells: Sequence[GridCell]) -> dict[str, Any]:
@@ -132,7 +133,7 @@ def _believed(job: CellJob, streams: _Streams, cells: Sequence[GridCell]) -> Ite
         return Beliefs.of(stream, places, belief, selected=evidence.selected)
 
     for (smoothing, order), same in groupby(sorted(cells), lambda cell: cell[:2]):
-        union = _models(streams.counts, smoothing, order)
+        union = _models(streams.counts, streams.corpus, smoothing, order)
         for cell in same:
             if cell.transition == "fixed":
                 way = fixed_transition(len(places), job.stay, job.per)
@@ -146,9 +147,11 @@ def _counts(corpus: Corpus, order: int) -> list[NgramCounts]:
     return [count_ngrams(text, order, vocabulary=corpus.vocabulary, markers=False) for text in sentences]
 
 
-def _models(counts: Sequence[NgramCounts], smoothing: str, order: int) -> Emissions:
-    options = ModelOptions(order=order, smoothing=smoothing)
-    return unite_models([as_printed(estimate_place(up_to(one, order), options)) for one in counts])
+def _models(counts: Sequence[NgramCounts], corpus: Corpus, smoothing: str, order: int) -> Emissions:
+    """The models of the counts of a corpus' sentences, place by place."""
+    options, texts = ModelOptions(order=order, smoothing=smoothing), corpus.sentences.values()
+    pairs = zip(counts, texts, strict=True)
+    return unite_models([as_printed(estimate_place(up_to(one, order), options, text)) for one, text in pairs])
 
 
 def up_to(counts: NgramCounts, order: int) -> NgramCounts:
@@ -159,7 +162,7 @@ def up_to(counts: NgramCounts, order: int) -> NgramCounts:
 
 def _frame_wise(streams: _Streams, smoothing: str) -> dict[str, int]:
     """Frames of each sequence that their own word alone gets right: naive Bayes, no filter, no selection."""
-    union, places = _models(streams.words, smoothing, 1), list(streams.corpus.sentences)
+    union, places = _models(streams.words, streams.whole, smoothing, 1), list(streams.corpus.sentences)
     listed = frozenset(streams.corpus.vocabulary)
     right = {}
     for stream in streams.tests:
