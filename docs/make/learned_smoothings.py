@@ -40,7 +40,7 @@ def judged(frames: Descriptors, tested: list[str], smoothing: str) -> tuple[list
         options = ModelOptions(smoothing=smoothing)
         learn_folder(folder, training.values, training.table, training.spec, DictionarySetOptions(), options)
         recognizer = make_recognizer(load_model(path))
-        streams = streams_of_rows(tests.values, tests.table, DictionarySet.load(folder.words))
+        streams = streams_of_rows(tests.values, tests.table, DictionarySet.load(folder.words), tests.spec)
         found = evaluate([recognizer.decode(stream) for stream in streams])
     return [found.accuracy, found.log_loss, found.ece], found.frames
 
