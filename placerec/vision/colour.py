@@ -11,8 +11,10 @@ import numpy as np
 
 from placerec.arrays import Floats, Singles
 from placerec.frames.sequence import Colours
+from placerec.vision.images import fit_pixels
 
 CELLS = 6  # per axis
+SIDE = 96  # pixels, above which the time goes up, and nothing else
 GAMMA = 2.2
 OFFSET = 0.1  # of the mean of all cells and channels
 LENGTH = CELLS**2 * 2
@@ -34,11 +36,13 @@ _FLATTENING = _flattening()
 def colour_grid(colours: Colours) -> Singles:
     """The mean linear light in 6 x 6 cells of an image (h, w, 3) blue, green, red: float32 (6, 6, 3) of 0..1.
 
-    Exact zeros of an image of one colour throughout.
+    An image of more than 96 pixels a side is first averaged to that. Exact zeros of an image of one colour throughout.
     """
-    if (colours == colours[0, 0]).all():
+    height, width = (min(side, SIDE) for side in colours.shape[:2])
+    small = np.asarray(fit_pixels(colours, height, width, "squash"), np.uint8)
+    if (small == small[0, 0]).all():
         return np.zeros((CELLS, CELLS, 3), np.float32)
-    linear = cv2.LUT(colours, _LINEAR)
+    linear = cv2.LUT(small, _LINEAR)
     return np.asarray(cv2.resize(linear, (CELLS, CELLS), interpolation=cv2.INTER_AREA), np.float32)
 
 
