@@ -11,6 +11,7 @@ import numpy as np
 from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.logs import LN10, log10, log10_of_sum, p_of
 from placerec.lm.mutable import SILENT, MutableModel, Trace, reweigh
+from placerec.lm.trie import runs
 
 
 def merge_weight(weights: Sequence[float], k: int) -> float:
@@ -26,7 +27,7 @@ def merge(model: MutableModel, other: MutableModel, weight: float, trace: Trace 
         new = np.flatnonzero(other.stored[n - 1] & ~model.stored[n - 1])
         model.stored[n - 1][new] = True
         if n > 1:
-            model.add_contexts(n - 1, np.unique(model.trie.prefix(n)[new]))
+            model.add_contexts(n - 1, runs(model.trie.prefix(n)[new])[0])
         stored = model.stored[n - 1]
         model.log10_p[n - 1][stored] = mixed[n - 1][stored]
     reweigh(model, trace)

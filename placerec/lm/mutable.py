@@ -16,7 +16,7 @@ from placerec.arrays import Floats, Ints, Mask, Singles
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.logs import EPSILON, log10, p_of
 from placerec.lm.score import Ngrams, ScoreTables, build_tables
-from placerec.lm.trie import Trie, per_context, united_trie
+from placerec.lm.trie import Trie, per_context, runs, united_trie
 from placerec.lm.vocabulary import Vocabulary
 
 
@@ -160,6 +160,12 @@ class MutableModel:
         for n in range(1, self.order + 1):
             self.refresh(n)
 
+    def context_places(self, n: int) -> Ints:
+        """How many contexts of length n stand before each row of order n, int64 (m_n,)."""
+        is_context = self.is_context[n - 1]
+        places: Ints = np.cumsum(is_context) - is_context
+        return places
+
     def add_contexts(self, n: int, rows: Ints) -> None:
         """Make rows of order n contexts; a context's ending is one too."""
         for k in range(n, 0, -1):
@@ -233,7 +239,7 @@ def weigh_contexts(model: MutableModel, n: int, trace: Trace, *, minimum: float 
         trace.weights(1, np.zeros(1, np.int64), np.array([left]), np.ones(1), log10(np.array([left])))
         return
     contexts = np.flatnonzero(model.is_context[n - 2])
-    group = np.searchsorted(contexts, model.trie.prefix(n)[rows])
+    group = model.context_places(n - 1)[model.trie.prefix(n)[rows]]
     num, den, overfull = settle_masses(model, n, rows, group, contexts, minimum, trace)
     with np.errstate(divide="ignore", invalid="ignore"):
         weight = np.where((num < EPSILON) & (den < EPSILON), 0, np.log10(num) - np.log10(den)).astype(np.float32)
@@ -301,14 +307,14 @@ def insert_prefixes(model: MutableModel, trace: Trace) -> None:
         lacking = model.is_context[n - 1] & ~model.stored[n - 1]
         lacking[needed[~model.stored[n - 1][needed]]] = True
         missing[n - 1] = np.flatnonzero(lacking)
-        needed = np.unique(trie.prefix(n)[missing[n - 1]]) if n > 1 else needed
+        needed = runs(trie.prefix(n)[missing[n - 1]])[0] if n > 1 else needed
     trace.lacking(missing, model.is_context)
     for n, rows in enumerate(missing, start=1):
         model.refresh(n)
         model.log10_p[n - 1][rows] = model.backed_off(n)[rows]
         model.stored[n - 1][rows] = True
         if n > 1:
-            model.add_contexts(n - 1, np.unique(trie.prefix(n)[rows]))
+            model.add_contexts(n - 1, runs(trie.prefix(n)[rows])[0])
         model.refresh(n)
         if len(rows):
             trace.inserted(n, rows)

@@ -32,7 +32,7 @@ def prune(
 def _prune_order(model: MutableModel, n: int, threshold: float, history: MutableModel, trace: Trace) -> None:
     contexts = np.flatnonzero(model.is_context[n - 2])
     rows = np.flatnonzero(model.stored[n - 1])
-    group = np.searchsorted(contexts, model.trie.prefix(n)[rows])
+    group = model.context_places(n - 1)[model.trie.prefix(n)[rows]]
     num, den, overfull = settle_masses(model, n, rows, group, contexts, None, trace)
     tried = ~overfull[group]
     rows, group = rows[tried], group[tried]

@@ -12,6 +12,7 @@ from placerec.lm.mix import merge, merge_weight
 from placerec.lm.mutable import MutableModel, reweigh, unite
 from placerec.lm.prune import prune, prune_improbable
 from placerec.lm.score import TokenSequence
+from placerec.lm.trie import runs
 from placerec.srilm.model.arpa import read_model, tables_of, write_model
 from placerec.srilm.model.class_scorers import Definitions
 from placerec.srilm.model.count_models import CountModel, format_count_model, read_count_model
@@ -208,7 +209,7 @@ class Models:
 
         def found() -> ContextTimes:
             assert times is not None
-            added = [np.unique(model.trie.prefix(n)[mask]) for n, mask in enumerate(new[1:], start=2)]
+            added = [runs(model.trie.prefix(n)[mask])[0] for n, mask in enumerate(new[1:], start=2)]
             return merged_times(times(), its, model, [np.zeros(0, np.int64), *added], numbers)
 
         return cache(found)
