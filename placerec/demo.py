@@ -174,7 +174,7 @@ def format_results(results: DemoResults) -> str:
 
 def _title(way: tuple[str, int]) -> str:
     if way == LEARNED:
-        return "four dictionaries, their weight learned (placerec learn)"
+        return "eight dictionaries, their weight learned (placerec learn)"
     return f"as in the paper: {way[0]}"
 
 

@@ -114,6 +114,7 @@ def look_up(
 def word_table(descriptors: Descriptors, dictionary: Dictionary) -> WordTable:
     """Look up the word of every frame, and what can be said of every unit."""
     count = len(dictionary.codebook)
+    descriptors = descriptors.part(dictionary.spec)
     units, distances = dictionary.words(descriptors.values)
     nearest, _ = nearest_units(project(descriptors.values, dictionary.pca), Units.of(dictionary.codebook))
     places = tuple(sorted(set(descriptors.places) - {""}))

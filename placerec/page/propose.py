@@ -17,7 +17,7 @@ from placerec.frames.table import FrameTable, Labels
 from placerec.model import ModelOptions, load_model, make_recognizer
 from placerec.model.folder import ModelFolder
 from placerec.model.learn import learn_folder
-from placerec.vision import Descriptors, DescriptorSpec, DictionarySet, DictionarySetOptions, describe
+from placerec.vision import DEFAULT_KIND, Descriptors, DescriptorSpec, DictionarySet, DictionarySetOptions, describe
 from placerec.words.tokenize import streams_of_rows
 
 log = logging.getLogger(__name__)
@@ -105,7 +105,7 @@ class Proposer:
         self.model = model
         # Known before any work, and before the page is opened.
         words = DictionarySet.load(load_model(model).folder.words) if model else None
-        self.spec = words.spec if words else DescriptorSpec()
+        self.spec = words.spec if words else DescriptorSpec(kind=DEFAULT_KIND)
         self.places = [*load_model(model).models] if model else []
         self._sequences = sequences
         self._described: dict[int, Descriptors] = {}

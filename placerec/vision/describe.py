@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterable, Sequence as Ordered
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -65,6 +65,12 @@ class Descriptors:
     def take(self, rows: RowIndex) -> "Descriptors":
         """Those of some frames, given by numbers, bool (n,) or a slice; what was skipped or constant is not counted."""
         return Descriptors(self.spec, self.values[rows], self.table.take(rows))
+
+    def part(self, spec: DescriptorSpec) -> "Descriptors":
+        """Those of `spec`, of which these are joined; VisionError if they are not."""
+        return (
+            self if spec == self.spec else replace(self, spec=spec, values=self.values[:, self.spec.columns_of(spec)])
+        )
 
     @staticmethod
     def concat(parts: Ordered["Descriptors"]) -> "Descriptors":

@@ -175,16 +175,14 @@ def words_in(
 
 def rows_to_look_up(descriptors: Singles | Descriptors, spec: DescriptorSpec) -> Singles:
     """The descriptors as float32 (n, d); VisionError for unusable ones and for `Descriptors` of another kind."""
-    if isinstance(descriptors, Descriptors):
-        try:
-            columns = descriptors.spec.columns_of(spec)
-        except VisionError as error:
-            raise VisionError(
-                f"the descriptors are of another kind ({descriptors.spec}) than the dictionary's ({spec}); "
-                "describe the images with the dictionary's"
-            ) from error
-        descriptors = descriptors.values[:, columns]
-    return checked_rows(descriptors, spec)
+    if not isinstance(descriptors, Descriptors):
+        return checked_rows(descriptors, spec)
+    if not descriptors.spec.holds(spec):
+        raise VisionError(
+            f"the descriptors are of another kind ({descriptors.spec}) than the dictionary's ({spec}); "
+            "describe the images with the dictionary's"
+        )
+    return checked_rows(descriptors.part(spec).values, spec)
 
 
 def write_dictionaries(path: Path, dictionaries: tuple[Dictionary, ...], spec: DescriptorSpec) -> None:

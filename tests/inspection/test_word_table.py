@@ -41,6 +41,14 @@ def dictionary(units: Units = "live") -> Dictionary:
     return Dictionary.fit(sample(40, 0), spec=SPEC, options=DictionaryOptions(size=7, units=units))
 
 
+def test_of_joined_descriptors_the_table_is_that_of_the_dictionarys_own() -> None:
+    frames = described()
+    spec = DescriptorSpec(kind="ranks+gist", image_size=16)
+    more = np.random.default_rng(3).random((60, 144), np.float32)
+    joined = Descriptors(spec, np.concatenate([more, frames.values], axis=1), frames.table)
+    assert word_table(joined, dictionary()).to_json() == word_table(frames, dictionary()).to_json()
+
+
 @pytest.mark.parametrize("units", ["live", "all"])
 def test_the_table_is_that_of_a_plain_loop(units: Units) -> None:
     frames, words = described(), dictionary(units)

@@ -36,7 +36,7 @@ def words_option(required: bool, text: str) -> Callable[[Command], Command]:
 
 def dictionary_option(function: Command) -> Command:
     """--dictionary: one of the file's. The command gets `name`."""
-    text = "Which dictionary, if train-words learned several: pn20, for instance.  [default: the first]"
+    text = "Which dictionary, if train-words learned several: gistpn20, for instance.  [default: the first]"
     return click.option(
         "--dictionary", "name", metavar="NAME", callback=lambda ctx, param, value: value or "", help=text
     )(function)
