@@ -22,6 +22,8 @@ if sys.platform != "win32":
     import fcntl
 
 PARTIAL = ".{}.partial-"
+# Where commands keep descriptors for each other, beside their outputs.
+CACHE = ".placerec-cache"
 REPLACED = ".{}.replaced-"
 
 
@@ -267,8 +269,8 @@ def _check_replaceable(path: Path, target: Path, owned: tuple[str, ...]) -> None
         return
     if not target.is_dir():
         raise OutputError(f"{path}: is a file, and a folder is to be written; name another folder or remove it")
-    # A single file that a killed run did not finish is ours as well.
-    patterns = (*owned, PARTIAL.format("*") + "*")
+    # A single file that a killed run did not finish is ours as well, and what commands kept that wrote into it.
+    patterns = (*owned, PARTIAL.format("*") + "*", CACHE)
     foreign = sorted(
         entry.name for entry in target.iterdir() if not any(fnmatch(entry.name, pattern) for pattern in patterns)
     )

@@ -198,6 +198,16 @@ def test_commands_share_what_lies_beside_their_outputs(tmp_path: Path, monkeypat
     assert kept(tmp_path / ".placerec-cache") == [one]
 
 
+def test_what_is_kept_in_a_folder_does_not_forbid_to_replace_it(tmp_path: Path) -> None:
+    run = frames_of(tmp_path, 8)
+    options = ("--views", "plain", "--size", 3, "--image-size", 16, "-q")
+    done("learn", run, "-o", tmp_path / "model", *options)
+    done("decode", run, "-m", tmp_path / "model", "-o", tmp_path / "model/beliefs", "-q")
+    assert kept(tmp_path / "model/.placerec-cache")
+    done("learn", run, "-o", tmp_path / "model", *options)
+    assert not (tmp_path / "model/.placerec-cache").exists()
+
+
 def test_compare_takes_what_others_described(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     for seed, name in enumerate(("run1", "run2")):
         write_images(tmp_path / "runs" / name, seed)
