@@ -349,6 +349,8 @@ def test_a_vocabulary_is_selected_by_what_makes_a_text_probable(texts: Path) -> 
         "a\t750000.000000\nb\t250000.000000\n",
         "",
     )
+    Path("zero.counts").write_text("a\t0\nb\t2\n")
+    assert call(select_vocab, "-quiet", "-heldout", "held.txt", "zero.counts")[1] == "a\t0.000000\nb\t1000000.000000\n"
     Path("x.sentid").write_text("id1 a\nid2 b b b\n")
     assert call(select_vocab, "-quiet", "-heldout", "held.txt", "x.sentid")[1].startswith("a\t250000.")
     assert call(select_vocab, "near.txt")[0] == 2

@@ -41,7 +41,8 @@ def select_vocab(arguments: Sequence[str], streams: Streams, tool: str = TOOL) -
     words = sorted(set().union(*corpora))
     p = np.array([shares(corpus, words) for corpus in corpora])
     counts = np.array([held_out.get(word, 0.0) for word in words])
-    tested = counts > 0
+    # Of words that no corpus gives any probability nothing is learned.
+    tested = (counts > 0) & p.any(axis=0)
     start = [1 / len(corpora)] * len(corpora)
     weights, steps = best_mix(p[:, tested], start, _PRECISION, counts=counts[tested])
     if not options["quiet"]:
