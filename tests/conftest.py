@@ -1,9 +1,12 @@
 """What several test modules share."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from helpers.browser import chromium, complaints, set_size
 from hypothesis import settings
 
 # The same cases every time: whether a change is green must not depend on luck. Search with HYPOTHESIS_PROFILE=search.
@@ -21,3 +24,19 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip("needs the reference material in ../shared, which is not here")
     return folder
+
+
+@pytest.fixture(scope="session")
+def started_browser() -> Iterator[Any]:
+    """One for all tests of pages: it takes seconds to start."""
+    with chromium() as window:
+        yield window
+
+
+@pytest.fixture
+def browser(started_browser: Any) -> Any:
+    """A browser with an empty page of 1280 x 900, and nothing left of other tests."""
+    started_browser.get("about:blank")
+    set_size(started_browser, 1280, 900)
+    complaints(started_browser)
+    return started_browser

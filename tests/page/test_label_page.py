@@ -1,13 +1,12 @@
 """`placerec label` in a browser: keys and the mouse change labels, and the file says at once what the page shows."""
 
 import shutil
-from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.browser import chromium, complaints, press, press_with, set_size
+from helpers.browser import complaints, press, press_with, set_size
 from helpers.pages import Served, serving
 from helpers.recordings import write_video
 from helpers.small_world import write_images
@@ -16,12 +15,6 @@ from helpers.waiting import wait_until
 
 pytest.importorskip("waitress", reason="needs waitress, which serves the page")
 Keys: Any = pytest.importorskip("selenium.webdriver.common.keys", reason="needs selenium").Keys
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium(1280, 900) as window:
-        yield window
 
 
 @pytest.fixture
@@ -193,10 +186,7 @@ def test_only_pictures_that_are_looked_at_are_made(browser: Any, tmp_path: Path)
         wait_until(lambda: browser.execute_script(f"return {film}") > 20, "no picture comes")
         assert browser.execute_script(f"return {film}") < 120
         set_size(browser, 400, 800)
-        try:
-            assert browser.execute_script("return document.documentElement.scrollWidth") <= 400
-        finally:
-            set_size(browser, 1280, 900)
+        assert browser.execute_script("return document.documentElement.scrollWidth") <= 400
 
 
 def test_proposals_are_accepted_mended_and_learned_anew(browser: Any, tmp_path: Path) -> None:

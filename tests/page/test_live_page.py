@@ -2,14 +2,13 @@
 
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from helpers.browser import chromium, complaints, press, set_size
+from helpers.browser import complaints, press, set_size
 from helpers.pages import serving
 from helpers.recordings import write_video
 from helpers.typed_commands import make_words, misused
@@ -36,12 +35,6 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     images = [cv2.imread(str(path)) for path in sorted((root / "runs/seq2/std_cam").iterdir())]
     write_video(root / "drive.mp4", "mp4v", [np.asarray(image, np.uint8) for image in images for _ in range(25)])
     return root
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium(1000, 800) as window:
-        yield window
 
 
 def shown(window: Any, element: str) -> str:

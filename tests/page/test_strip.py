@@ -1,14 +1,13 @@
 """The strip that pages share, in a browser: what it draws, and how keys and the mouse move it."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from helpers.browser import chromium, complaints, picture_of, press, press_with, set_size
+from helpers.browser import complaints, picture_of, press, press_with, set_size
 
 from placerec.figures import canvas
 from placerec.page.assets import in_one, names, text
@@ -34,14 +33,9 @@ strip.show(data);
 </script>"""
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium(800, 400) as window:
-        yield window
-
-
 @pytest.fixture
 def page(browser: Any, tmp_path: Path) -> Any:
+    set_size(browser, 800, 400)
     file = tmp_path / "strip.html"
     file.write_text(PAGE.format(style=text("page.css"), script=in_one("strip.js")), encoding="utf-8")
     browser.get(file.as_uri())
@@ -136,12 +130,9 @@ def test_the_mouse_marks_a_stretch_and_drags_a_border(page: Any) -> None:
 
 
 def test_it_is_as_wide_as_a_telephone(page: Any) -> None:
-    try:
-        set_size(page, 400, 400)
-        assert run(page, "document.documentElement.scrollWidth") <= 400
-        assert run(page, "document.querySelector('#strip canvas').clientWidth") > 350
-    finally:
-        set_size(page, 800, 400)
+    set_size(page, 400, 400)
+    assert run(page, "document.documentElement.scrollWidth") <= 400
+    assert run(page, "document.querySelector('#strip canvas').clientWidth") > 350
 
 
 def test_a_hundred_thousand_frames_are_drawn_at_once(page: Any) -> None:
