@@ -154,17 +154,15 @@ def follow_live(
     for transitions per frame. So do frames without a usable image, which give no belief. Both are logged, and so is
     the report at the end, which `tell` gets, too. Whoever iterates is part of the latency: a frame is answered when
     the next one is asked for. Raises SourceError for a source that gives nothing, StreamError for times that are
-    needed and missing or go back. `see` gets each frame that is worked on, before.
+    needed and missing or go back. `see` gets each frame that is worked on, before, in colours.
     """
     tally = _Tally(sequence)
     # Filters are made when they are first needed: not while the first frames wait.
     colours = dictionary.spec.colours
     dictionary.words_of(np.dstack([_ANY] * 3) if colours else _ANY)
-    frames = partial(_live_frames, sequence, colours)
-    with (
-        closing(LatestFrameQueue(frames)) as queue,
-        ended_by_interrupt(queue),
-    ):
+    # Whoever shows frames wants colours, too.
+    frames = partial(_live_frames, sequence, colours or see is not None)
+    with closing(LatestFrameQueue(frames)) as queue, ended_by_interrupt(queue):
         try:
             for live in queue:
                 if see is not None:
