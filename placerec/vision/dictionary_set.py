@@ -30,7 +30,7 @@ from placerec.vision.options import DictionarySetOptions, View
 from placerec.vision.pca import Pca, moments, projected
 from placerec.vision.som import EpochProgress, MapQuality
 from placerec.vision.spec import DescriptorSpec, descriptor
-from placerec.vision.views import fit_blocks, place_normalised, place_numbers
+from placerec.vision.views import fit_blocks, half_whitened, place_normalised, place_numbers
 
 log = logging.getLogger(__name__)
 
@@ -74,7 +74,10 @@ class DictionarySet:
         is left.
         """
         rows = training_rows(descriptors, spec, options.of_map(options.sizes[0]))
-        views = options.views_of(spec)
+        labelled = len({*(places or ())} - {""}) > 1
+        views = options.views_of(spec, labelled)
+        if not (labelled or options.views):
+            log.warning("no two places are labelled: views are half whitened, not normalised by places")
         made: dict[View, list[Dictionary]] = {}
         missing: dict[View, str] = {}
         for part in dict.fromkeys(view.part_of(spec) for view in views):
@@ -209,18 +212,19 @@ def _fit_part(
         return made
 
     of_projection: dict[str, list[Dictionary] | str] = {}
-    normalised: Pca | str = ""
+    others: dict[str, Pca | str] = {"half": half_whitened(pca)} if "half" in projections else {}
     # A fifth of the descriptors, for many passes; handed out for those of a map alone.
     with spooled(projected(rows.source, pca), work if "plain" in projections else None) as codes:
         if "plain" in projections:
             of_projection["plain"] = learned(codes, pca)
         if "pn" in projections:
-            normalised = _normalised(pca, codes, rows, places, work)
-    if isinstance(normalised, Pca):
-        with spooled(projected(rows.source, normalised), work) as codes:
-            of_projection["pn"] = learned(codes, normalised)
-    elif normalised:
-        of_projection["pn"] = normalised
+            others["pn"] = _normalised(pca, codes, rows, places, work)
+    for projection, found in others.items():
+        if isinstance(found, str):
+            of_projection[projection] = found
+        else:
+            with spooled(projected(rows.source, found), work) as codes:
+                of_projection[projection] = learned(codes, found)
     return of_projection
 
 

@@ -11,7 +11,7 @@ from placerec.vision.spec import KINDS, DescriptorSpec
 
 Units = Literal["live", "all"]
 UNITS: tuple[str, ...] = get_args(Units)
-PROJECTIONS = ("plain", "pn")
+PROJECTIONS = ("plain", "pn", "half")
 # What words are made of by default, with the views of `View.default`: docs/vision.md has what each is worth.
 DEFAULT_KIND = "gist+lbp+ranks"
 
@@ -25,7 +25,7 @@ class View:
 
     @classmethod
     def parse(cls, text: str) -> "View":
-        """A view from `plain`, `pn`, `KIND`, `KIND:pn` or `KIND+KIND:pn`; VisionError for anything else."""
+        """A view from `plain`, `pn`, `half`, `KIND`, `KIND:pn` or `KIND+KIND:half`; VisionError for anything else."""
         if text in PROJECTIONS:
             return cls((), text)
         kinds, colon, projection = text.partition(":")
@@ -36,15 +36,21 @@ class View:
                     f"no view is called {text!r}; choose some of {known}, as in gist, gist:pn, gist+lbp:pn"
                 )
         if colon and projection not in PROJECTIONS:
-            raise VisionError(f"{text!r}: no projection is called {projection!r}; choose plain or pn")
+            raise VisionError(
+                f"{text!r}: no projection is called {projection!r}; choose one of {', '.join(PROJECTIONS)}"
+            )
         return cls(tuple(kinds.split("+")), projection or "plain")
 
     @classmethod
-    def default(cls, spec: DescriptorSpec) -> tuple["View", ...]:
-        """The views of descriptors where none are named: the first kind as it is, then each kind place-normalised."""
+    def default(cls, spec: DescriptorSpec, labelled: bool = True) -> tuple["View", ...]:
+        """The views of descriptors where none are named: the first kind as it is, then each kind place-normalised.
+
+        Half whitened where no two places are `labelled`.
+        """
+        projected = "pn" if labelled else "half"
         return tuple(
             cls((), projection) if len(spec.kinds) == 1 else cls((kind,), projection)
-            for kind, projection in ((spec.kinds[0], "plain"), *((kind, "pn") for kind in spec.kinds))
+            for kind, projection in ((spec.kinds[0], "plain"), *((kind, projected) for kind in spec.kinds))
         )
 
     def part_of(self, spec: DescriptorSpec) -> DescriptorSpec:
@@ -105,7 +111,8 @@ class DictionarySetOptions:
 
     `views`: descriptors and projection of each, as `View.parse` reads them: `gist`, `gist:pn`, `gist+lbp:pn`; without
     a kind (`plain`, `pn`) of all descriptors there are; () for those of `View.default`. `plain` are the principal
-    components, `pn` these place-normalised (`views.place_normalised`). `sizes`: the sides of the maps. The other
+    components, `pn` these place-normalised (`views.place_normalised`), `half` these half whitened
+    (`views.half_whitened`). `sizes`: the sides of the maps. The other
     options are those of `DictionaryOptions`, and every map's. Raises VisionError for a value that cannot be used.
     """
 
@@ -144,9 +151,12 @@ class DictionarySetOptions:
         every = {name: value for name, value in asdict(self).items() if name not in ("views", "sizes")}
         return DictionaryOptions(size, **every)
 
-    def views_of(self, spec: DescriptorSpec) -> tuple[View, ...]:
-        """The views of descriptors of `spec`; VisionError if one needs others, or if two are one."""
-        views = tuple(map(View.parse, self.views)) or View.default(spec)
+    def views_of(self, spec: DescriptorSpec, labelled: bool = True) -> tuple[View, ...]:
+        """The views of descriptors of `spec`; VisionError if one needs others, or if two are one.
+
+        `labelled`: whether there are frames of two places.
+        """
+        views = tuple(map(View.parse, self.views)) or View.default(spec, labelled)
         for number, view in enumerate(views):
             part = view.part_of(spec), view.projection
             if part in [(other.part_of(spec), other.projection) for other in views[:number]]:

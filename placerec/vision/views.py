@@ -1,7 +1,8 @@
 """Views: projections of descriptors that a map can be learned from.
 
 `plain` is the PCA. `pn`, place-normalised, weighs every direction by how little the frames of one place differ in it:
-with S the covariance of frames about the mean of their place, it makes S the identity.
+with S the covariance of frames about the mean of their place, it makes S the identity. `half`, half whitened, does a
+part of that without labels.
 """
 
 import logging
@@ -84,6 +85,17 @@ def _as_stored(components: Floats) -> Singles:
     """The components (k, d) float32, on the grid that makes a projection independent of the order of its sums."""
     exponents = exact.exponents(components)
     return np.ldexp(exact.on_grid(np.ldexp(components, -exponents)), exponents).astype(np.float32)
+
+
+def half_whitened(pca: Pca) -> Pca:
+    """The projection whose coordinates are divided by the fourth root of their variances: it needs no labels.
+
+    What varies most counts less than in the principal components, and what varies little is not blown up to it.
+    """
+    # No direction grows by more than the rest for having no variance at all.
+    variances = np.maximum(pca.variances.astype(np.float64), np.finfo(np.float32).eps * float(pca.variances[0]))
+    components = _as_stored(pca.components / np.sqrt(np.sqrt(variances))[:, None])
+    return replace(pca, components=components, variances=np.sqrt(variances).astype(np.float32))
 
 
 def place_numbers(places: Sequence[str] | None, n: int) -> Ints:

@@ -1,5 +1,6 @@
 """Views by name: several descriptors of a frame in one row, and dictionaries of some of its columns."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,8 @@ from placerec.vision import (
     descriptor,
 )
 from placerec.vision.options import View
-from placerec.vision.pca import moments
-from placerec.vision.views import fit_blocks
+from placerec.vision.pca import fit_pca, moments, project
+from placerec.vision.views import fit_blocks, half_whitened
 
 SPEC = DescriptorSpec(kind=DEFAULT_KIND, image_size=32)
 PLACES = ["hall", "office"] * 30
@@ -122,9 +123,9 @@ def test_blocks_weigh_alike_however_large_their_values(values: np.ndarray) -> No
 
 
 def test_views_that_cannot_be(values: np.ndarray) -> None:
-    with pytest.raises(VisionError, match="no view is called 'lda'; choose some of plain, pn, gist, lbp, ranks"):
+    with pytest.raises(VisionError, match="no view is called 'lda'; choose some of plain, pn, half, gist, lbp, ranks"):
         DictionarySetOptions(("lda",))
-    with pytest.raises(VisionError, match="'gist:lda': no projection is called 'lda'; choose plain or pn"):
+    with pytest.raises(VisionError, match="'gist:lda': no projection is called 'lda'; choose one of plain, pn, half"):
         DictionarySetOptions(("gist:lda",))
     with pytest.raises(VisionError, match="there are no centrist descriptors beside those of gist\\+lbp\\+ranks"):
         fit(values, "centrist")
@@ -132,8 +133,21 @@ def test_views_that_cannot_be(values: np.ndarray) -> None:
         fit(values[:, :384], "gist", "plain", spec=SPEC.part("gist"))
 
 
-def test_without_labels_the_normalised_views_are_left_out(values: np.ndarray, caplog: pytest.LogCaptureFixture) -> None:
+def test_without_labels_the_views_are_half_whitened(values: np.ndarray, caplog: pytest.LogCaptureFixture) -> None:
     options = DictionarySetOptions((), (2,), components=8)
     made = DictionarySet.fit(values, spec=SPEC, options=options)
-    assert made.names == ("",)
-    assert "the views gist:pn, lbp:pn, ranks:pn are left out: it needs frames of two places" in caplog.text
+    assert made.names == ("", "gisthalf2", "lbphalf2", "rankshalf2")
+    assert made.options.views == ("gist", "gist:half", "lbp:half", "ranks:half")
+    assert "no two places are labelled: views are half whitened, not normalised by places" in caplog.text
+    named = DictionarySet.fit(values, spec=SPEC, options=replace(options, views=("gist", "lbp:pn")))
+    assert named.names == ("",)
+    assert "the view lbp:pn is left out: it needs frames of two places" in caplog.text
+
+
+def test_half_whitened_coordinates_have_the_roots_of_the_variances(values: np.ndarray) -> None:
+    gist = values[:, :384]
+    plain = fit_pca(moments(gist), 8)
+    half = half_whitened(plain)
+    codes, halved = project(gist, plain), project(gist, half)
+    np.testing.assert_allclose(halved, codes / plain.variances**0.25, rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(halved.var(axis=0, ddof=1), half.variances, rtol=1e-3)

@@ -243,7 +243,7 @@ def test_without_labels_the_view_is_left_out_and_that_is_said(
 ) -> None:
     rows, _ = sample(300)
     with caplog.at_level(logging.WARNING):
-        found = fit(rows, places)
+        found = fit(rows, places, views=("plain", "pn"))
     assert found.names == ("", "plain4")
     assert found.fingerprint == fit(rows, None, views=("plain",)).fingerprint
     assert f"the view pn is left out: {message}" in caplog.text

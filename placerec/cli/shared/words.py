@@ -11,7 +11,7 @@ from placerec.cli.shared.descriptors import take_network
 from placerec.cli.shared.values import Command, FiniteRange, listed
 
 
-def _views(ctx: click.Context, param: click.Parameter, value: str) -> tuple[str, ...]:
+def _views(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[str, ...]:
     if not value:
         return ()
     from placerec.errors import VisionError
@@ -33,9 +33,8 @@ def dictionary_options(function: Command) -> Command:
         "--views",
         metavar="VIEW,...",
         callback=_views,
-        default="",
-        help="What maps see: KIND, the principal components of such descriptors, or KIND:pn, these by how little the "
-        "frames of one place differ; KIND+KIND for several together, plain and pn for all there are.  "
+        help="What maps see: KIND, the principal components of such descriptors; KIND:pn, these by how little the "
+        "frames of one place differ; KIND:half, half whitened; KIND+KIND, several together; plain, pn, half: all.  "
         "[default: gist,gist:pn,lbp:pn,ranks:pn]",
     )
     @groups.word(

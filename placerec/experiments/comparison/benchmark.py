@@ -60,7 +60,7 @@ MakeStepper = Callable[[], StepFunction]
 # Chooses the options of a method of descriptors by its training and a seed: what then fits it to a training set.
 ChooseOptions = Callable[..., FitPoints]
 # The views of `vision.views` that such methods are compared on.
-PLAIN, NORMALISED = PROJECTIONS
+PLAIN, NORMALISED = PROJECTIONS[:2]
 
 
 @dataclass(frozen=True)
