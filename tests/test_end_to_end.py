@@ -50,7 +50,7 @@ def kept(folder: Path) -> list[str]:
 
 def test_the_files_are_the_promised_ones(results: Path) -> None:
     assert files(results) == sorted(
-        ["words.npz", "evaluation.json", "beliefs/lap2.tsv"]
+        ["words.npz", "evaluation.json", "beliefs/lap2.tsv", "beliefs/beliefs.json"]
         + [f"tokens/{name}" for name in ("lap1.tsv", "lap2.tsv", "vocab.txt", "tokens.json")]
         + [f"model/{name}" for name in ("model.json", "vocab.txt", "nonevents.txt")]
         + [f"model/{place}.arpa" for place in PLACES]

@@ -37,8 +37,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_all_commands_of_the_contract_so_far_are_there() -> None:
     expected = (
-        "adapt-lm calibrate check compare decode demo describe evaluate experiment inspect lab label learn report "
-        "show-frame show-words stability tokenize train-lm train-words update"
+        "adapt-lm calibrate check compare decode demo describe evaluate experiment inspect lab label learn relight "
+        "report show-frame show-words stability tokenize train-lm train-words update"
     )
     assert " ".join(NAMES) == expected
     assert set(commands.commands) == {*NAMES, *TOOLS}
