@@ -22,6 +22,7 @@ from placerec.cli import shared
 )
 @click.option("--methods", metavar="A,B,...", help="Only these methods.  [default: all]")
 @shared.words_option(False, "Your own dictionaries, where they are not to be learned from TRAIN.")
+@shared.network_option
 @shared.matrix_option
 @shared.size_option(20)
 @shared.seed_option("Another seed, another map.")

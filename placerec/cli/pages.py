@@ -12,6 +12,7 @@ from placerec.cli.shared.pages import ShowPage
 @shared.command(epilog="Example: placerec label RUNS/run7 -m model/")
 @shared.whole_source_arguments
 @click.option("-m", "--model", metavar="MODEL/", type=shared.PATH, help="A folder of learn, which proposes labels.")
+@shared.network_option
 @shared.page_options
 @shared.talk_options
 def label(sources: tuple[Path, ...], show: ShowPage, **how: Any) -> None:

@@ -41,6 +41,7 @@ class _ReportCommand(GroupedCommand):
     help="The images that were decoded, to be seen in the page.",
 )
 @shared.words_option(False, "Show the typical frame of each word, too; needs --frames.")
+@shared.network_option
 @shared.reading_options()
 @shared.output_option("report.html", "The page to write: one file.")
 @shared.cache_option

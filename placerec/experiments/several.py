@@ -43,7 +43,8 @@ def learn_several(job: WordsJob, seed: int, given: DictionarySet | None = None) 
             else:
                 learn_models(ModelFolder(folder), values, table, training[0].spec, given, ModelOptions())
     models = load_model(path)
-    dictionaries = DictionarySet.load(models.folder.words)
+    network = None if given is None or given.spec.network is None else given.spec.network.file
+    dictionaries = DictionarySet.load(models.folder.words, network=network)
     tests = [one.load() for one in job.test]
     streams = tuple(stream for found in tests for stream in tokens_of(found, dictionaries))
     return SeveralDictionaries(models, streams, front_end_cost(job, tests, dictionaries))

@@ -30,20 +30,21 @@ def label_pages(
     sources: Iterable[Path | str],
     *,
     model: Path | str | None = None,
+    network: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     host: str = HERE,
     port: int = 0,
 ) -> PageServer:
     """`placerec label`: the server of a page that labels the drives in `sources`; its `run` serves until Ctrl-C.
 
-    `model`: a MODEL/ folder with words.npz that proposes labels. `host`, `port`: see `PageServer`. Raises SourceError
-    for sources that cannot be read or labelled, ModelError for a model that cannot be loaded, MissingExtraError without
-    the server, PageError if it cannot serve there.
+    `model`: a MODEL/ folder with words.npz that proposes labels; `network`: the file of the image network, for words of
+    one. `host`, `port`: see `PageServer`. Raises SourceError for sources that cannot be read or labelled, ModelError
+    for a model that cannot be loaded, MissingExtraError without the server, PageError if it cannot serve there.
     """
     sequences = find_sequences(sources, options=source_options)
     drives = [DriveLabels(sequence, source_options) for sequence in sequences]
     _check_apart(drives)
-    proposer = Proposer(sequences, None if model is None else Path(model))
+    proposer = Proposer(sequences, None if model is None else Path(model), network)
     desk = LabelDesk(drives, proposer)
     server = PageServer("label.html", desk.answer, host=host, port=port)
     if model is not None:

@@ -99,12 +99,14 @@ class Proposer:
     `said`: what it does, or why it could not; `busy`: whether it does something.
     """
 
-    def __init__(self, sequences: Sequence[FrameSequence], model: Path | None) -> None:
+    def __init__(
+        self, sequences: Sequence[FrameSequence], model: Path | None, network: Path | str | None = None
+    ) -> None:
         self.busy, self.said, self.round = False, "", 0
         self.proposals: list[Proposal] | None = None
         self.model = model
         # Known before any work, and before the page is opened.
-        words = DictionarySet.load(load_model(model).folder.words) if model else None
+        words = DictionarySet.load(load_model(model).folder.words, network=network) if model else None
         self.spec = words.spec if words else DescriptorSpec(kind=DEFAULT_KIND)
         self.places = [*load_model(model).models] if model else []
         self._sequences = sequences

@@ -51,6 +51,7 @@ def report(
     *,
     frames: Iterable[Path | str] = (),
     words: Path | str | None = None,
+    network: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
     cache: Path | str | None = None,
     progress: ProgressBar = silent,
@@ -59,9 +60,9 @@ def report(
 
     Files of one name and the same frames are one drive, seen by several systems, which the page shows beside each
     other. What `decode --explain` wrote beside a file is taken in. `frames`: image sources (`source_options`) whose
-    frames are shown; `words`: the words.npz, for the typical frame of each word among these, and `cache`: see
-    `placerec.vision.describe`. Raises EvaluationError, SourceError and VisionError for what cannot be read or does not
-    belong together.
+    frames are shown; `words`: the words.npz, for the typical frame of each word among these, `network`: the file of the
+    image network, for words of one, and `cache`: see `placerec.vision.describe`. Raises EvaluationError, SourceError
+    and VisionError for what cannot be read or does not belong together.
     """
     named = read_files(beliefs)
     explained = {path: path.with_name(one.name + EXPLAINED) for path, one in named}
@@ -71,7 +72,7 @@ def report(
     if sources := list(frames):
         sequences = sequences_of(drives, find_sequences(sources, options=source_options))
         with progress("describe") as show:
-            tiles = tiles_of(drives, sequences, words, show, cache) if words else {}
+            tiles = tiles_of(drives, sequences, words, show, cache, network) if words else {}
         with progress("pictures") as show:
             pictures = pictures_of(drives, sequences, wanted_frames(drives, tiles), show)
         shown = Shown(pictures, tiles)

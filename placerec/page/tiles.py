@@ -17,13 +17,14 @@ def tiles_of(
     words: Path | str,
     progress: Progress | None = None,
     cache: Path | str | None = None,
+    network: Path | str | None = None,
 ) -> dict[str, tuple[str, int]]:
     """Word -> drive and number of the frame that is typical of it, for the words that a frame of the drives has.
 
-    `sequences`: the images of each drive by the drive's name. `cache`: see `placerec.vision.describe`. Raises
-    VisionError for a words.npz that cannot be read.
+    `sequences`: the images of each drive by the drive's name. `cache`: see `placerec.vision.describe`. `network`: the
+    file of the image network, for words of one. Raises VisionError for a words.npz that cannot be read.
     """
-    dictionaries = DictionarySet.load(words)
+    dictionaries = DictionarySet.load(words, network=network)
     named = [FrameSequence(name, one.frames, one.source, one.recording) for name, one in sequences.items()]
     found = describe(named, dictionaries.spec, cache=cache, progress=progress)
     return typical_frames(drives, found, dictionaries)

@@ -46,7 +46,7 @@ def open_network(file: Path | str, layer: str = "") -> Network:
         named = str(settings.pop("layer", ""))
         tensor = found.tensor(layer or named)
         input_of = _input(found, settings.pop("size", None), settings.pop("layout", ""))
-        given = Network(found.digest, 1, tensor, **input_of, **settings, file=str(path))
+        given = Network(found.digest, 1, tensor, **input_of, **settings, file=str(path.absolute()))
         return replace(given, length=_Runner(given, found).length)
     except VisionError as error:
         raise VisionError(f"{path}: {error}") from error
@@ -60,7 +60,7 @@ def with_file(network: Network, file: Path | str) -> Network:
             f"{file}: is another network (SHA-256 {found[:12]}...) than that of the words ({network.digest[:12]}...); "
             "name the file that they were learned with"
         )
-    return replace(network, file=str(file))
+    return replace(network, file=str(Path(file).absolute()))
 
 
 def fit_for(network: Network, colours: Colours) -> Colours:

@@ -14,8 +14,10 @@ from helpers.small_world import write_coloured
 from helpers.typed_commands import done, fails, misused
 
 from placerec.errors import VisionError
+from placerec.frames import find_sequences
 from placerec.frames.image import read_image
 from placerec.model import load_recognizer
+from placerec.page.propose import Proposer
 from placerec.vision import DictionarySet
 
 pytest.importorskip("onnx")
@@ -150,6 +152,23 @@ def test_what_looks_at_words_takes_the_network(world: Path, tmp_path: Path) -> N
     assert json.loads(changes.stdout)["frames"] == 64
     for command in (("show-words", world / "words.npz"), ("stability", "-w", world / "words.npz")):
         fails("whose file is not named; say --network FILE", *command, world / "runs")
+
+
+def test_pages_and_comparisons_take_the_network(world: Path, tmp_path: Path) -> None:
+    pytest.importorskip("sklearn")
+    net, words = ("--network", world / "net.onnx"), ("-w", world / "words.npz")
+    done("decode", world / "runs/seq4", *words, "-m", world / "model", *net, "-o", tmp_path / "beliefs", "-q")
+    page = ("report", tmp_path / "beliefs", "--frames", world / "runs/seq4", *words, "-o", tmp_path / "r.html", "-q")
+    done(*page, *net)
+    fails("whose file is not named; say --network FILE", *page, "--no-cache")
+    given = ("compare", world / "runs", "--test", world / "runs/seq4", *words, "--methods", "hohmm,naive-bayes", "-q")
+    found = done(*given, *net, "-o", tmp_path / "out")
+    assert re.search(r"naive-bayes +(9\d|100)\.", found.stdout), found.stdout
+    shutil.copy(world / "words.npz", world / "model/words.npz")
+    sequences = find_sequences([world / "runs/seq4"])
+    proposer = Proposer(sequences, world / "model", world / "net.onnx")
+    assert proposer.spec.network is not None
+    assert proposer.spec.network.file == str(world / "net.onnx")
 
 
 def test_what_names_no_network(world: Path, tmp_path: Path) -> None:

@@ -71,6 +71,7 @@ def compare(
     *,
     methods: Iterable[str] | None = None,
     words: Path | str | None = None,
+    network: Path | str | None = None,
     matrix: Path | str | None = None,
     size: int = SIZE,
     seed: int = 0,
@@ -81,13 +82,14 @@ def compare(
     """Learn on the sequences of `train` that `test` does not name, run every method on those of `test`, write `out`.
 
     `words`: a words.npz whose dictionaries `hohmm` uses, all others that of the view `plain` that comes first there;
-    without it they are learned from the training sequences, `size` being that of all methods but `hohmm`. `matrix`: a
-    .npy or .npz file of descriptors that were computed elsewhere (`vision.external`); the rows of a .npy are those of
-    the sequences as `train` names them, and then of those that `test` alone does. `seed`: of dictionaries, prototypes
-    and the bootstrap. What an earlier run into `out` has done on the same data is kept; `cache`: the folder for it, by
-    default in `out`. `progress(label)` is a context manager that gives a callback(done, total). Raises EvaluationError
-    for an unknown method and for what nothing can be compared on, MissingExtraError for what is not installed,
-    VisionError for `words` and a `matrix` that cannot be used, and what `find_sequences` raises.
+    without it they are learned from the training sequences, `size` being that of all methods but `hohmm`. `network`:
+    the file of the image network, for words of one. `matrix`: a .npy or .npz file of descriptors that were computed
+    elsewhere (`vision.external`); the rows of a .npy are those of the sequences as `train` names them, and then of
+    those that `test` alone does. `seed`: of dictionaries, prototypes and the bootstrap. What an earlier run into `out`
+    has done on the same data is kept; `cache`: the folder for it, by default in `out`. `progress(label)` is a context
+    manager that gives a callback(done, total). Raises EvaluationError for an unknown method and for what nothing can be
+    compared on, MissingExtraError for what is not installed, VisionError for `words` and a `matrix` that cannot be
+    used, and what `find_sequences` raises.
     """
     chosen = check_methods(methods, described=matrix is None)
     for name in chosen:
@@ -95,7 +97,7 @@ def compare(
             check_optional(package, name, "leave it out of --methods")
     out = Path(out)
     check_figure(out / "methods.png")
-    own = None if words is None else _own_words(Path(words), described=matrix is None)
+    own = None if words is None else _own_words(Path(words), network, described=matrix is None)
     given = replace(_split(train, test, source_options), words=own, matrix=None if matrix is None else Path(matrix))
     _doubt(given)
     cache = out / "cache" if cache is None else Path(cache)
@@ -118,9 +120,9 @@ def compare(
     return found
 
 
-def _own_words(path: Path, described: bool) -> DictionarySet:
+def _own_words(path: Path, network: Path | str | None, described: bool) -> DictionarySet:
     """One's own dictionaries, if methods can use them on descriptors that are computed here (`described`), or not."""
-    words = DictionarySet.load(path)
+    words = DictionarySet.load(path, network=network)
     if described and words.spec.kind == "npy":
         raise EvaluationError(f"{path}: is of descriptors that were computed elsewhere; --descriptor npy:FILE has them")
     if _plain(words) is None:
