@@ -1,6 +1,6 @@
 """Pages of what was believed: `placerec report`."""
 
-from itertools import chain
+from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ class _ReportCommand(GroupedCommand):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Put `--frames` before each of its sources."""
         taking, spelled = False, []
-        for arg, after in zip(args, [*args[1:], "-"], strict=True):
+        for arg, after in zip_longest(args, args[1:], fillvalue="-"):
             if arg == _FRAMES and after.startswith("-"):
                 raise click.BadOptionUsage(_FRAMES, f"Option {_FRAMES!r} needs a source behind it.", ctx)
             if arg.startswith("-") and arg != "-":

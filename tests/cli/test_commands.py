@@ -145,6 +145,14 @@ def test_unknown_commands_and_options_are_errors_of_usage() -> None:
     misused("Missing option '-o' / '--out'", "train-lm", "tokens")
 
 
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "demo"])
+def test_a_command_without_arguments_says_what_it_wants_by_its_example(name: str) -> None:
+    misused("Missing argument", name)
+    (line,) = placerec(name).stderr.splitlines()
+    assert line.startswith(f"placerec {name}: ")
+    assert f"; for example: placerec {name} " in line
+
+
 def test_wrong_usage_is_one_line_with_a_remedy(world: Path) -> None:
     for told, *typed in (
         ("placerec: No such command 'foo'; see `placerec --help`", "foo"),
