@@ -239,3 +239,20 @@ def test_scripts_share_counts_among_what_classes_stand_for(tmp_path: Path) -> No
     assert out.read_text() == "A 0.666667 x\nA 0.333333 y z\nB 1 q\n"
     assert call("uniform-classes", str(tmp_path / "c"))[1] == "A 0.5 x\nA 0.5 y z\nB 1 q\n"
     assert call("replace-words-with-classes")[0] == 2
+
+
+def test_expansions_too_long_to_be_expanded_are_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("m.lm").write_text("\\data\\\nngram 1=3\n\n\\1-grams:\n-0.3\tA\n-0.3\tb\n-99\t<s>\n\n\\end\\\n")
+    Path("long.classes").write_text(f"A 1 {'a ' * 50_000}\n")
+    arguments = ["ngram", "-lm", "m.lm", "-classes", "long.classes", "-write-lm", "out.lm", "-expand-classes"]
+    status, out, error = call(*arguments, "0")
+    assert (status, out) == (1, "")
+    told = "classes stand for n-grams that have more than 20000000 words together; ask for shorter n-grams"
+    assert error == f"-expand-classes 0: {told}\n"
+    assert not Path("out.lm").exists()
+    status, _, error = call(*arguments, "2")
+    assert (status, error) == (0, "")
+    assert "\ta a\n" in Path("out.lm").read_text()

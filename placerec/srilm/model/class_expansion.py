@@ -17,6 +17,8 @@ from placerec.srilm.text.streams import SrilmError
 from placerec.srilm.text.vocabulary import WordList
 
 _MOST = 5_000_000
+# Of all n-grams together: those of an expansion of a thousand words have a hundred million.
+_MOST_WORDS = 20_000_000
 _BLOCK = 1 << 18
 
 
@@ -79,7 +81,7 @@ def _masses(mutable: MutableModel, model: ClassModel, words: WordList, longest: 
     by_class: defaultdict[Ngram, float] = defaultdict(lambda: -math.inf)
     numbers = words.numbers(mutable.trie.vocabulary)
     start = words.index.get(SENTENCE_START, -1)
-    ways = 0
+    ways = held = 0
     for n in range(1, min(mutable.order, longest or mutable.order) + 1):
         rows = np.flatnonzero(mutable.stored[n - 1])
         for begin in range(0, len(rows), _BLOCK):
@@ -92,9 +94,14 @@ def _masses(mutable: MutableModel, model: ClassModel, words: WordList, longest: 
                         "ask for shorter n-grams, or prune the model first"
                     )
                 classed = any(token in model.definitions.of for token in tokens)
-                for ngram, log10_p in _stood_for(tokens, each, model):
-                    if not longest or len(ngram) <= longest:
-                        by_class[ngram] = add_logs(by_class[ngram], log10_p if classed else -math.inf)
+                for ngram, log10_p in _stood_for(tokens, each, model, longest):
+                    held += len(ngram)
+                    if held > _MOST_WORDS:
+                        raise SrilmError(
+                            f"-expand-classes {longest}: classes stand for n-grams that have more than {_MOST_WORDS} "
+                            "words together; ask for shorter n-grams"
+                        )
+                    by_class[ngram] = add_logs(by_class[ngram], log10_p if classed else -math.inf)
     by_class.pop((start,), None)
     masses = dict(by_class)
     for n in {len(ngram) for ngram in masses}:
@@ -119,10 +126,10 @@ def _each(model: ClassModel, matrix: Ints, start: int) -> Singles:
     return log10_p
 
 
-def _stood_for(tokens: Ngram, each: Singles, model: ClassModel) -> Iterator[tuple[Ngram, float]]:
+def _stood_for(tokens: Ngram, each: Singles, model: ClassModel, longest: int) -> Iterator[tuple[Ngram, float]]:
     """The word n-grams that end in the last of some tokens and begin in the first, and their log10 p.
 
-    `each` (n,): log10 p of each token given those before it.
+    `each` (n,): log10 p of each token given those before it. Those of more than `longest` words are left out (0: none).
     """
     choices = [list(model.definitions.of.get(token, {(token,): 0.0}).items()) for token in tokens]
     joint = float(np.cumsum(each, dtype=np.float32)[-1])
@@ -134,5 +141,6 @@ def _stood_for(tokens: Ngram, each: Singles, model: ClassModel) -> Iterator[tupl
         words = tuple(word for expansion, _ in chosen for word in expansion)
         first, last = len(chosen[0][0]), len(words) - len(chosen[-1][0])
         for begin in range(first):
-            for end in range(max(last, begin) + 1, len(words) + 1):
+            stop = min(len(words), begin + longest) if longest else len(words)
+            for end in range(max(last, begin) + 1, stop + 1):
                 yield words[begin:end], log10_p
