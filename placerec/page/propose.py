@@ -111,7 +111,6 @@ class Proposer:
         self.places = [*load_model(model).models] if model else []
         self._sequences = sequences
         self._described: dict[int, Descriptors] = {}
-        self._names = [tuple(frame.name for frame in sequence.frames) for sequence in sequences] if model else []
         self._lock = threading.Lock()
 
     def start(self, labels: Callable[[], Sequence[Sequence[str]]] | None = None) -> bool:

@@ -82,7 +82,8 @@ Handler = Callable[[Request], Answer | None]
 
 def json_answer(value: object, status: HTTPStatus = HTTPStatus.OK) -> Answer:
     """An answer of JSON; nan is not JSON and raises ValueError."""
-    return Answer(json.dumps(value, ensure_ascii=False, allow_nan=False).encode(), status=status)
+    # A path may hold what is no text.
+    return Answer(json.dumps(value, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace"), status=status)
 
 
 @dataclass

@@ -180,3 +180,14 @@ def test_a_port_that_is_taken_and_a_package_that_is_missing_are_told(served: Ser
     run = run_without(("waitress",), "label", folder)
     assert run.returncode == 1
     assert run.stderr.splitlines()[-1].startswith("placerec: a page needs the package waitress, which is not installed")
+
+
+def test_others_may_ask_only_where_that_was_said_and_only_with_the_token(folder: Path) -> None:
+    with serving("label", folder, "-q", "--host", "0.0.0.0") as served:
+        name = socket.gethostname()
+        assert served.address == f"http://{name}:{served.port}/?{served.token}"
+        for host in (f"127.0.0.1:{served.port}", f"10.1.2.3:{served.port}", f"{name}:{served.port}"):
+            assert served.below("state", Host=host)[0] == 200, host
+            assert served.ask("/state", Host=host)[0] == 403, host
+        assert served.below("state", Host=f"evil.example:{served.port}")[0] == 421
+        assert served.ask(f"/?{served.token}", Host=f"127.0.0.1:{served.port}")[0] == 200
