@@ -106,8 +106,14 @@ function wordsOf(data, drive, system, frame) {
   const reasons = system.reasons[frame];
   const words = reasons ? reasons.said.map(([word]) => word) : [system.vocabulary[system.words[frame]]].filter(Boolean);
   if (!words.length) return [];
-  const tiles = words.map((word) => make("span", "word", tileOf(data, word), word));
+  const tiles = words.map((word) => make("span", "word", tileOf(data, word), ...breakable(word)));
   return [make("h3", "", words.length > 1 ? "Words" : "Word"), make("div", "words", ...tiles)];
+}
+
+// A word that may go on in a new line behind the name of its dictionary.
+function breakable(word) {
+  const at = word.lastIndexOf(".") + 1;
+  return at ? [word.slice(0, at), make("wbr"), word.slice(at)] : [word];
 }
 
 function factor(log10) {
