@@ -92,5 +92,6 @@ def format_learned(learned: Learned) -> str:
             f"tests     accuracy {100 * found.accuracy:.1f} % (majority class {100 * majority:.1f} %), log loss "
             f"{loss:.3f}, calibration error (ECE) {found.ece:.3f} on {tested}"
         )
-    lines.append(f"model     {learned.out}: `placerec decode SOURCE -m {learned.out}` needs nothing else")
+    more = "nothing else" if made.spec.network is None else "--network FILE, the file of the network, and nothing else"
+    lines.append(f"model     {learned.out}: `placerec decode SOURCE -m {learned.out}` needs {more}")
     return "\n".join(lines)

@@ -121,6 +121,7 @@ def test_learn_takes_a_network_as_a_view(world: Path, tmp_path: Path) -> None:
     args = ("--views", views, "--size", 3, "--image-size", 16, "-q")
     result = done("learn", world / "runs", "--test", world / "runs/seq4", "-o", tmp_path / "model", *args)
     assert re.search(r"accuracy (9\d|100)\.", result.stdout), result.stdout
+    assert "needs --network FILE, the file of the network, and nothing else" in result.stdout
     made = DictionarySet.load(tmp_path / "model/words.npz", network=net)
     assert [one.view for one in made.dictionaries] == ["gist", "colour:pn", "onnx:pn", "gist+onnx:pn"]
     (path,) = (tmp_path / "model/beliefs").glob("seq4.tsv")
