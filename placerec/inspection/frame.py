@@ -15,10 +15,12 @@ from placerec.figures.canvas import MARGIN, figure_file, panel, picture_file, pl
 from placerec.frames import Sequence, SourceOptions
 from placerec.frames.folder import is_image
 from placerec.frames.image import read_image
-from placerec.frames.sequence import Gray, gray_levels
+from placerec.frames.sequence import ColourImage, Gray, Image, gray_levels
 from placerec.inspection.words import WordTable, look_up, typical_images
 from placerec.jobs import Progress
 from placerec.vision import DescriptorSpec, Dictionary, DictionarySet, descriptor, fit_image
+from placerec.vision.images import fit_pixels
+from placerec.vision.onnx import fit_for
 from placerec.vision.pca import project
 
 if TYPE_CHECKING:
@@ -43,6 +45,7 @@ _ROSE, _MARK = "#0072B2", "#D55E00"
 class FrameView:
     """One image and a dictionary: `picture` is the image as it is fitted, `values` its descriptor of kind `spec`.
 
+    The picture is grey (h, w), or red, green, blue (h, w, 3) where only colours are looked at.
     distances: to every unit, float64 (K,). unit: that of its word, which is the nearest of those that may be words.
     nearest: the five nearest units, live or not, and behind them that of the word if it is not among them. table: what
     the words are among some frames, None where no source was given.
@@ -50,7 +53,7 @@ class FrameView:
 
     name: str
     spec: DescriptorSpec
-    picture: Gray
+    picture: NDArray[Any]
     values: Singles
     words: tuple[str, ...]
     hits: Ints
@@ -118,7 +121,7 @@ def view_frame(image: Path | str, dictionary: Dictionary) -> FrameView:
     return FrameView(
         Path(image).name,
         spec,
-        fit_image(gray_levels(read), spec.image_size, spec.fit),
+        _seen(read, spec),
         values,
         dictionary.vocabulary,
         dictionary.hits,
@@ -126,6 +129,15 @@ def view_frame(image: Path | str, dictionary: Dictionary) -> FrameView:
         distances,
         tuple(nearest if unit in nearest else [*nearest, unit]),
     )
+
+
+def _seen(image: Image, spec: DescriptorSpec) -> NDArray[Any]:
+    """The image as its descriptors get it: grey, or (h, w, 3) red, green, blue if all of them look at colours."""
+    if not isinstance(image, ColourImage) or "image_size" in spec.settings:
+        return fit_image(gray_levels(image), spec.image_size, spec.fit)
+    if spec.network is not None:
+        return fit_for(spec.network, image.colours)[..., ::-1]
+    return fit_pixels(image.colours, spec.image_size, spec.image_size, spec.fit)[..., ::-1]
 
 
 def format_frame(view: FrameView) -> str:
@@ -205,6 +217,8 @@ def _fitted(axes: "Axes", picture: NDArray[Any], title: str, *, windows: bool, p
     """The picture, with the lines between its 4 x 4 windows or not; `paleness` 1 is white."""
     side = picture.shape[0]
     shown = picture * (1 - paleness) + 255 * paleness
+    if shown.ndim == 3:
+        shown = np.rint(shown).astype(np.uint8)
     axes.imshow(shown, cmap="gray", vmin=0, vmax=255, extent=(0, side, side, 0), interpolation="nearest")
     for line in np.arange(1, _BLOCKS) * side / _BLOCKS if windows else []:
         axes.axhline(line, color="0.75", linewidth=0.7)

@@ -5,6 +5,7 @@ import re
 import shutil
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from helpers.network_camera import jpegs, network_camera
@@ -16,6 +17,8 @@ from helpers.typed_commands import done, fails, misused
 from placerec.errors import VisionError
 from placerec.frames import find_sequences
 from placerec.frames.image import read_image
+from placerec.frames.sequence import Colours
+from placerec.inspection.frame import view_frame
 from placerec.model import load_recognizer
 from placerec.page.propose import Proposer
 from placerec.vision import DictionarySet
@@ -42,6 +45,13 @@ def accuracy(beliefs: Path) -> float:
     found = re.search(r"accuracy +([\d.]+) %", done("evaluate", beliefs).stdout)
     assert found
     return float(found[1])
+
+
+def opened(path: Path) -> Colours:
+    """The colours of an image file."""
+    image = read_image(path, colours=True)
+    assert not isinstance(image, np.ndarray)
+    return image.colours
 
 
 def test_the_words_of_a_network_tell_places_apart(world: Path, tmp_path: Path) -> None:
@@ -102,8 +112,7 @@ def test_any_number_of_jobs_gives_the_same_bytes(world: Path, tmp_path: Path) ->
 
 
 def test_a_video_has_the_words_of_its_frames(world: Path, tmp_path: Path) -> None:
-    shown = [read_image(path, colours=True) for path in sorted((world / "runs/seq4/std_cam").iterdir())]
-    frames = [image.colours for image in shown if not isinstance(image, np.ndarray)]
+    frames = [opened(path) for path in sorted((world / "runs/seq4/std_cam").iterdir())]
     path = write_video(tmp_path / "run.avi", "FFV1", frames)
     done("tokenize", path, "-w", world / "words.npz", "--network", world / "net.onnx", "-o", tmp_path / "t", "-q")
 
@@ -149,6 +158,11 @@ def test_what_looks_at_words_takes_the_network(world: Path, tmp_path: Path) -> N
     image = next((world / "runs/seq4/std_cam").iterdir())
     seen = done("show-frame", image, world / "runs", "-w", world / "words.npz", *net, "-o", tmp_path / "seen.png")
     assert "nearest" in seen.stdout
+    view = view_frame(image, DictionarySet.load(world / "words.npz", network=world / "net.onnx").dictionaries[0])
+    # In the size and the colours that the network sees: red before blue.
+    expected = cv2.resize(opened(image), (32, 32), interpolation=cv2.INTER_LINEAR)[..., ::-1]
+    assert view.picture.shape == (32, 32, 3)
+    assert np.abs(view.picture.astype(int) - expected).mean() < 3
     changes = done("stability", world / "runs", "-w", world / "words.npz", *net, "--json")
     assert json.loads(changes.stdout)["frames"] == 64
     for command in (("show-words", world / "words.npz"), ("stability", "-w", world / "words.npz")):
