@@ -16,7 +16,7 @@ from placerec.frames import Sequence, SourceOptions, find_sequences
 from placerec.frames.images import picture_at
 from placerec.page.labels import ChangedError, DriveLabels, places_of, stretches_of
 from placerec.page.propose import Proposer, look_first
-from placerec.page.server import HERE, Answer, PageServer, RefusedError, Request, json_answer
+from placerec.page.server import HERE, Answer, PageServer, RefusedError, Request, check_server, json_answer
 
 log = logging.getLogger(__name__)
 
@@ -41,6 +41,7 @@ def label_pages(
     one. `host`, `port`: see `PageServer`. Raises SourceError for sources that cannot be read or labelled, ModelError
     for a model that cannot be loaded, MissingExtraError without the server, PageError if it cannot serve there.
     """
+    check_server()
     sequences = find_sequences(sources, options=source_options)
     drives = [DriveLabels(sequence, source_options) for sequence in sequences]
     _check_apart(drives)

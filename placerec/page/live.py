@@ -28,7 +28,7 @@ from placerec.model.decoding import AS_LEARNED, Decoding, ScorerName
 from placerec.page.keeping import KeptFrames
 from placerec.page.label import HEIGHTS, jpeg
 from placerec.page.labels import MAX_NAME
-from placerec.page.server import HERE, Answer, PageServer, RefusedError, Request, json_answer
+from placerec.page.server import HERE, Answer, PageServer, RefusedError, Request, check_server, json_answer
 
 log = logging.getLogger(__name__)
 
@@ -59,6 +59,7 @@ def decode_live_page(
     model new places, a header line with these comes before the lines that follow. Other arguments, and what is raised:
     see `decode_live` and `PageServer`.
     """
+    check_server()
     sequence, dictionary, decoder = open_live(
         source,
         model,

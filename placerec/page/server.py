@@ -111,6 +111,11 @@ class _Allowance:
             return True
 
 
+def check_server() -> None:
+    """Raise MissingExtraError if no page can be served: before any work."""
+    check_optional("waitress", "a page")
+
+
 class PageServer:
     """Serves one page: `html` is its file in the package, `handler` answers what is below the token.
 
@@ -119,7 +124,7 @@ class PageServer:
     """
 
     def __init__(self, html: str, handler: Handler, *, host: str = HERE, port: int = 0) -> None:
-        check_optional("waitress", "a page")
+        check_server()
         from waitress.server import create_server
 
         # Of what strangers send wrong nobody needs to hear.

@@ -205,6 +205,11 @@ def test_proposals_are_accepted_mended_and_learned_anew(browser: Any, tmp_path: 
         assert places(folder)
         press_with(browser, Keys.SHIFT, Keys.ENTER)
         saved(browser)
+        wait_until(lambda: not shown(browser, "looks"), "what was accepted is still to be looked at")
+        press(browser, Keys.HOME, Keys.DELETE)
+        wait_until(lambda: shown(browser, "looks"), "what lost its label is not to be looked at")
+        press_with(browser, Keys.CONTROL, "z")
+        saved(browser)
         count_keys(browser, mend, folder, truth)
         assert (folder / "localization/places.lst").read_text() == truth
         press(browser, "r")

@@ -177,9 +177,14 @@ def test_a_port_that_is_taken_and_a_package_that_is_missing_are_told(served: Ser
         "--port",
         served.port,
     )
-    run = run_without(("waitress",), "label", folder)
-    assert run.returncode == 1
-    assert run.stderr.splitlines()[-1].startswith("placerec: a page needs the package waitress, which is not installed")
+    # Before anything is read.
+    for command in (
+        ("label", "nothing"),
+        ("decode", "camera:99", "--live", "-w", "nothing", "-m", "nothing", "--page"),
+    ):
+        run = run_without(("waitress",), *command)
+        told = "placerec: a page needs the package waitress, which is not installed: "
+        assert (run.returncode, run.stderr.startswith(told)) == (1, True), run.stderr
 
 
 def test_others_may_ask_only_where_that_was_said_and_only_with_the_token(folder: Path) -> None:

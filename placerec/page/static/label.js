@@ -85,6 +85,7 @@ function show() {
   showPlaces();
   showFrame();
   if (page.round !== desk.round) fetchProposal();
+  else if (page.proposal && !desk.saving && page.version !== drive.version) fetchLooks();
 }
 
 function showPlaces() {
@@ -135,6 +136,7 @@ byId("picture").addEventListener("error", async () => {
 async function openDrive(number) {
   desk.now = number;
   page.proposal = page.doubt = null;
+  page.looks = [];
   page.round = -1;
   if (desk.drive.timed && !page.times.has(number)) page.times.set(number, await numbers(`times/${number}`, Float64Array));
   strip.frame = 0;
@@ -151,9 +153,22 @@ async function fetchProposal() {
   page.proposal = found.stretches;
   page.doubt = doubt;
   desk.learnOf(found.stretches.map(([, , place]) => place));
-  page.looks = found.looks;
-  page.look = -1;
+  takeLooks(found);
   show();
+}
+
+// What is to be looked at depends on the labels, as they are saved.
+async function fetchLooks() {
+  const number = desk.now;
+  page.version = desk.drive.version;
+  const found = await ask(`proposal/${number}`).catch(() => ({}));
+  if (number === desk.now && found.looks) takeLooks(found);
+}
+
+function takeLooks({ looks }) {
+  page.version = desk.drive.version;
+  page.looks = looks;
+  page.look = -1;
   showLooks();
 }
 
@@ -192,6 +207,8 @@ function lookAt(number) {
 
 function edit(stretches) {
   const real = desk.change([[desk.now, stretches]]);
+  // The first that is left is the next to look at.
+  if (real) page.look = -1;
   if (page.proposal) showLooks();
   return real;
 }
