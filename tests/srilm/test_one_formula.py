@@ -29,7 +29,7 @@ def test_the_command_makes_the_same_lines(
     train_model({"hall": visits()}, [f"w{i:02d}" for i in range(60)], tmp_path / "model", options=options)
     command = options.ngram_count_command("hall")
     if command is None:
-        assert name == "lidstone"
+        assert name in ("lidstone", "jelinek-mercer")
         return
     monkeypatch.chdir(tmp_path / "model")
     ours = lines("hall.arpa", markers)
