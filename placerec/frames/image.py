@@ -95,10 +95,7 @@ def decode_gray(data: bytes, name: str) -> Gray:
     Raises SourceError that begins with `name`: empty, truncated, damaged, no image, pixels of another type, a side
     below 8 pixels, more than MAX_PIXELS of them (PNG and JPEG).
     """
-    import cv2
-
-    # ANYDEPTH: without it 16 bits are cut to the upper 8, which leaves 12-bit cameras a black picture.
-    return as_gray(_decode(name, _checked(data, name), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH), name)
+    return _gray_levels(_checked(data, name), name)
 
 
 def decode_image(data: bytes, name: str, *, colours: bool = False) -> Image:
@@ -109,12 +106,20 @@ def decode_image(data: bytes, name: str, *, colours: bool = False) -> Image:
     """
     import cv2
 
-    gray = decode_gray(data, name)
+    data = _checked(data, name)
+    gray = _gray_levels(data, name)
     if not colours:
         return gray
     # Grey levels made of the colours would be others.
-    pixels = _decode(name, _checked(data, name), cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
+    pixels = _decode(name, data, cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
     return ColourImage(gray, as_colours(pixels, name))
+
+
+def _gray_levels(data: bytes, name: str) -> Gray:
+    import cv2
+
+    # ANYDEPTH: without it 16 bits are cut to the upper 8, which leaves 12-bit cameras a black picture.
+    return as_gray(_decode(name, data, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH), name)
 
 
 def _checked(data: bytes, name: str) -> bytes:
