@@ -12,7 +12,8 @@ from helpers.small_world import PLACES, run_through, write_tokens
 from helpers.typed_commands import SMALL, done, fails, make_words, misused, placerec
 
 from placerec.cli import commands
-from placerec.cli.shared import SMOOTHING_NAMES
+from placerec.cli.shared import SMOOTHING_NAMES, work
+from placerec.files import CACHE
 from placerec.lm import SMOOTHINGS
 from placerec.srilm.tools.run import TOOLS
 from placerec.words import write_stream
@@ -122,6 +123,10 @@ def test_options_of_one_name_are_one_option() -> None:
 
 def test_the_names_of_smoothings_are_those_of_the_library() -> None:
     assert tuple(SMOOTHINGS) == SMOOTHING_NAMES
+
+
+def test_the_folder_of_kept_descriptors_is_that_of_the_library() -> None:
+    assert work.CACHE == CACHE
 
 
 def test_the_version_is_told() -> None:

@@ -9,7 +9,6 @@ import click
 
 from placerec.cli.shared import groups
 from placerec.cli.shared.values import PATH, Command, usage
-from placerec.files import CACHE
 
 if TYPE_CHECKING:
     from placerec.jobs import Executor
@@ -31,6 +30,8 @@ jobs_option = groups.work(
     type=click.IntRange(min=1),
     help="Processes that share the work; the output is the same for any number.  [default: one a processor]",
 )
+# That of placerec.files, written out: --help would wait for what it loads.
+CACHE = ".placerec-cache"
 _CLUSTER = groups.work(
     "--cluster",
     metavar="ADDRESS|local:N",
