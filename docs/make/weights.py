@@ -4,8 +4,8 @@ python docs/make/weights.py [DATA] [--set NAME ...] [--seeds N] [--work DIR]
 
 With DATA, the folder of the sets, every fold of FOLDS is run for the first seeds (0 to 2): METHODS by `placerec
 compare`, and VARIANTS of what `placerec learn` makes; METHODS also on the laboratory, which is rendered. What was done
-is kept in DIR, so that a run that was stopped goes on, and docs/recognizer/weights.csv gets all of it. Then the tables
-of the page are written anew.
+is kept in DIR, so that a run that was stopped goes on, and docs/recognizer/weights.csv gets all of it, in place of what
+it had of these sets. Then the tables of the page are written anew.
 """
 
 import argparse
@@ -252,17 +252,22 @@ def _spread(seeds: np.ndarray, digits: int) -> str:
 
 
 def tables(results: Sequence[Result]) -> dict[str, str]:
-    """What belongs between the marks of the page, by name."""
-    seeds = len({one.seed for one in results})
-    with_seeds = f"seed{'s' * (seeds > 1)} 0{f' to {seeds - 1}' * (seeds > 1)}"
-    made = {
-        f"weights {kind}s": f"{NOTES[kind].format(seeds=with_seeds)}\n\n{markdown(table(results, kind, FOLDS))}"
-        for kind in ("method", "variant")
-    }
-    head, lines = table(results, "method", LIGHT)
-    # A mean over both says nothing.
-    light = markdown((head[:-1], [line[:-1] for line in lines]))
-    return made | {"weights light": f"{NOTES['light'].format(seeds=with_seeds)}\n\n{light}"}
+    """What belongs between the marks of the page, by name; "" where there are no results for it yet."""
+    made = {f"weights {kind}s": _noted(results, kind, kind, FOLDS) for kind in ("method", "variant")}
+    return made | {"weights light": _noted(results, "light", "method", LIGHT)}
+
+
+def _noted(results: Sequence[Result], note: str, kind: str, sets: Iterable[str]) -> str:
+    """A table with a sentence before it."""
+    own = [one for one in results if one.kind == kind and one.set in sets]
+    if not own:
+        return ""
+    head, lines = table(own, kind, sets)
+    # A mean over one set and another light of that set says nothing.
+    cut = -1 if note == "light" else None
+    seeds = len({one.seed for one in own})
+    told = NOTES[note].format(seeds=f"seed{'s' * (seeds > 1)} 0{f' to {seeds - 1}' * (seeds > 1)}")
+    return f"{told}\n\n{markdown((head[:cut], [line[:cut] for line in lines]))}"
 
 
 def filled(page: str, made: Mapping[str, str]) -> str:
@@ -281,9 +286,8 @@ if __name__ == "__main__":
     options = parser.parse_args()
     logging.getLogger("placerec").setLevel(logging.ERROR)
     if options.data:
-        made = list(run(options.data, options.set or [*FOLDS, *LIGHT], range(options.seeds), options.work))
-        if options.set:
-            sys.stdout.write("\n".join(tables(made).values()))
-            sys.exit()
-        write_text(RESULTS, format_results(made))
+        chosen = options.set or [*FOLDS, *LIGHT]
+        before = read_results(RESULTS) if RESULTS.exists() else []
+        made = list(run(options.data, chosen, range(options.seeds), options.work))
+        write_text(RESULTS, format_results([*(one for one in before if one.set not in chosen), *made]))
     write_text(PAGE, filled(PAGE.read_text(encoding="utf-8"), tables(read_results(RESULTS))))
