@@ -112,8 +112,8 @@ NOTES = {
     "method": "Per cent of the frames right, ECE and log loss ({seeds}): means over the folds of a set with their "
     "frames as weights, then over sets, of which the standard deviation is over seeds.",
     "variant": "Learned otherwise than by default, or with something of what was learned left out ({seeds}):",
-    "light": "On the **synthetic** laboratory, tested on the third run of every path and light, and on one light after "
-    "the other that no training sequence has ({seeds}):",
+    "light": "Per cent of the frames right, ECE and log loss on the **synthetic** laboratory, tested on the third run "
+    "of every path and light, and on one light after the other that no training sequence has ({seeds}):",
 }
 # What is measured, by name.
 Figures = dict[str, Any]

@@ -31,6 +31,7 @@ def test_means_are_over_frames_in_a_set_then_over_sets_and_spread_over_seeds(pro
     page = (
         "A\n<!-- table: weights methods -->\nold\n<!-- end of table -->\n<!-- table: b -->\nc\n<!-- end of table -->\n"
     )
+    assert set(program.tables([]).values()) == {""}
     made = program.filled(page, {"weights methods": "new\n"})
     assert made == page.replace("old", "new")
 
