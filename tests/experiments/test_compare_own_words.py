@@ -81,8 +81,9 @@ def test_given_descriptors_are_as_good_as_those_computed_here(tmp_path: Path, ru
     # The rows of a .npy are in the order of TRAIN, whichever sequences test.
     compare([runs], [runs / "run1"], tmp_path / "rows", methods=METHODS, size=3, matrix=tmp_path / "rows.npy")
     for method in METHODS:
-        assert beliefs(tmp_path / "here", method) == beliefs(tmp_path / "named", method)
-        assert beliefs(tmp_path / "here", method) == beliefs(tmp_path / "rows", method)
+        # What is described here for hohmm is more than GIST.
+        assert (beliefs(tmp_path / "here", method) == beliefs(tmp_path / "named", method)) == (method != "hohmm")
+        assert beliefs(tmp_path / "named", method) == beliefs(tmp_path / "rows", method)
     assert np.isnan(found.cost.descriptor)
     assert 0 < found.cost.word < np.inf
     assert "computed elsewhere" in (tmp_path / "named/methods.svg").read_text(encoding="utf-8")
