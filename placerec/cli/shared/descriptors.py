@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Of `vision.KINDS`, which takes numpy to import.
 KINDS = ("gist", "lbp", "ranks", "centrist", "colour")
-_NETWORK = re.compile(rf"(^|\+)onnx:(?P<named>.+?)(?=\+({'|'.join(KINDS)})([+:]|$)|:(plain|pn)$|$)")
+_NETWORK = re.compile(rf"(^|\+)onnx:(?P<named>.+?)(?=\+({'|'.join(KINDS)})([+:]|$)|:(plain|pn|half)$|$)")
 _KEPT = "placerec.network"
 
 
