@@ -127,7 +127,9 @@ def test_decisions_are_written_and_read(world: Path, tmp_path: Path) -> None:
         assert message in refused.stderr
     for more, name in (((), "run3.tsv"), (("--json",), "run3.jsonl")):
         assert decode(*args, "-o", tmp_path / "b", *more).exit_code == 0
-        assert sorted(path.name for path in (tmp_path / "b").iterdir()) == sorted(["run3.explain.jsonl", name])
+        assert sorted(path.name for path in (tmp_path / "b").iterdir()) == sorted(
+            ["beliefs.json", "run3.explain.jsonl", name]
+        )
     reasons = [json.loads(line) for line in (tmp_path / "b/run3.explain.jsonl").read_text().splitlines()]
     beliefs = [json.loads(line) for line in (tmp_path / "b/run3.jsonl").read_text().splitlines()]
     assert [one["best"] for one in reasons] == [one["best"] for one in beliefs]

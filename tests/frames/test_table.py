@@ -88,7 +88,7 @@ def test_columns_of_different_lengths_are_refused() -> None:
 
 def test_a_table_is_told_in_a_line() -> None:
     table = FrameTable.of("run", map(str, range(3)), places=["hall", "", "hall"])
-    assert repr(table) == "FrameTable(3 frames, 1 sequences, 1 places)"
+    assert repr(table) == "FrameTable(3 frames, 1 sequence, 1 place)"
     assert table.labelled.tolist() == [True, False, True]
 
 

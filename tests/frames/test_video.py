@@ -220,7 +220,7 @@ def test_a_folder_of_videos_is_a_folder_of_sequences(tmp_path: Path, caplog: pyt
     (tmp_path / "cover.jpg").touch()
     (tmp_path / ".hidden.mp4").touch()
     assert [sequence.name for sequence in find_sequences([tmp_path])] == ["run1", "run2", "run3", "run10"]
-    assert f"{tmp_path}: holds sequences; 1 images beside them not read" in caplog.messages
+    assert f"{tmp_path}: holds sequences; 1 image beside them not read" in caplog.messages
     (tmp_path / "b/run2.mkv").write_bytes((tmp_path / "run2.avi").read_bytes())
     names = [sequence.name for sequence in find_sequences([tmp_path])]
     assert names == ["run1", "b-run2", f"{tmp_path.name}-run2", "run3", "run10"]

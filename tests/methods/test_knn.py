@@ -28,5 +28,5 @@ def test_fewer_frames_than_neighbours_all_vote() -> None:
 
 def test_without_scikit_learn_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sklearn", None)
-    with pytest.raises(MissingExtraError, match=r"knn needs .*scikit-learn.*placerec\[systems\]"):
+    with pytest.raises(MissingExtraError, match=r"knn needs the package scikit-learn, .*-m pip install scikit-learn"):
         knn.fit(clouds())

@@ -145,5 +145,7 @@ def test_a_place_that_a_fold_lacks_and_a_single_sequence_do_no_harm(name: str) -
 @pytest.mark.parametrize("name", CHOOSE)
 def test_without_scikit_learn_the_extra_is_named(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sklearn", None)
-    with pytest.raises(MissingExtraError, match=rf"{name} needs .*scikit-learn.*placerec\[systems\]"):
+    with pytest.raises(
+        MissingExtraError, match=rf"{name} needs the package scikit-learn, .*-m pip install scikit-learn"
+    ):
         CHOOSE[name](clouds())

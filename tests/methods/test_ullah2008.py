@@ -83,5 +83,7 @@ def test_a_place_that_a_fold_lacks_and_a_single_sequence_do_no_harm() -> None:
 
 def test_without_scikit_learn_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sklearn", None)
-    with pytest.raises(MissingExtraError, match=r"ullah2008 needs .*scikit-learn.*placerec\[systems\]"):
+    with pytest.raises(
+        MissingExtraError, match=r"ullah2008 needs the package scikit-learn, .*-m pip install scikit-learn"
+    ):
         ullah2008.choose(clouds())
