@@ -204,7 +204,7 @@ def test_tokenize(machines: LocalDask, images: Path, tmp_path: Path, monkeypatch
     assert contents(tmp_path / "here") == contents(tmp_path / "there")
     options = ["-w", tmp_path / "words.npz", "-o", tmp_path / "command", "--cluster", machines.have(1)]
     monkeypatch.chdir(images)  # where the workers are not
-    result = done("tokenize", "seq1", "seq2", "seq3", *options)
+    result = done("tokenize", "seq1", "seq2", "seq3", "--no-cache", *options)
     assert result.stderr.startswith("72 frames described\n")
     assert contents(tmp_path / "here") == contents(tmp_path / "command")
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from placerec.experiments.cost import FrontEndCost, front_end_cost
 from placerec.experiments.store import WordsJob, key_of
 from placerec.files import whole_folder
 from placerec.frames.table import FrameTable
@@ -18,11 +17,11 @@ from placerec.words.tokenize import tokens_of
 
 @dataclass(frozen=True)
 class SeveralDictionaries:
-    """Models of several dictionaries, the test sequences in their words, and the cost of a frame's words."""
+    """Several dictionaries and models of their words, and the test sequences in these words."""
 
+    dictionaries: DictionarySet
     models: PlaceModels
     tests: tuple[WordStream, ...] = field(repr=False)
-    cost: FrontEndCost
 
 
 def learn_several(job: WordsJob, seed: int, given: DictionarySet | None = None) -> SeveralDictionaries:
@@ -47,4 +46,4 @@ def learn_several(job: WordsJob, seed: int, given: DictionarySet | None = None) 
     dictionaries = DictionarySet.load(models.folder.words, network=network)
     tests = [one.load() for one in job.test]
     streams = tuple(stream for found in tests for stream in tokens_of(found, dictionaries))
-    return SeveralDictionaries(models, streams, front_end_cost(job, tests, dictionaries))
+    return SeveralDictionaries(dictionaries, models, streams)

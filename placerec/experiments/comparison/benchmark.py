@@ -106,7 +106,7 @@ class Benchmark:
     """The sequences through one dictionary, the first `training` of them to learn from, and the models of these.
 
     `second`: the sequences through a second dictionary, where a method asks for it, and `several`: what `learn` makes
-    of them. `seed`: of what a method draws.
+    of them, and `several_cost`: what a frame's words cost there. `seed`: of what a method draws.
     """
 
     encoded: EncodedSequences
@@ -115,6 +115,7 @@ class Benchmark:
     seed: int
     second: EncodedSequences | None = None
     several: SeveralDictionaries | None = None
+    several_cost: FrontEndCost | None = None
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -236,14 +237,14 @@ def _started(decoder: SequenceDecoder) -> MakeStepper:
 def _run_several(benchmark: Benchmark) -> MethodRun:
     """The words of all dictionaries, with what training learned; the cost of other descriptors and words is added."""
     several = benchmark.several
-    if several is None:
+    if several is None or benchmark.several_cost is None:
         raise ValueError("hohmm needs several dictionaries")
     words = [
         list(zip(*(stream.in_dictionary(name).words for name in stream.dictionaries), strict=True))
         for stream in several.tests
     ]
     run = _timed(_started(make_decoder(HOHMM, several.models)), benchmark, words)
-    one, all_ = benchmark.encoded.cost, several.cost
+    one, all_ = benchmark.encoded.cost, benchmark.several_cost
     more = max(all_.word - one.word, 0.0)
     if not math.isnan(one.descriptor):
         more += max(all_.descriptor - one.descriptor, 0.0)

@@ -29,6 +29,7 @@ from placerec.experiments.comparison.benchmark import (
 from placerec.experiments.comparison.figure import plot_comparison
 from placerec.experiments.comparison.page import comparison_page
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
+from placerec.experiments.cost import front_end_cost
 from placerec.experiments.several import learn_several
 from placerec.experiments.store import Described, WordsJob, describe_all, held_output, keep_given, key_of, load
 from placerec.figures.canvas import check_figure
@@ -168,13 +169,14 @@ def _benchmark(
     if TWO_WORDS in kinds:
         other = job(described(SECOND))
         second = encode(other, other.dictionary(), ())
-    several = None
+    several, cost = None, None
     if SEVERAL_WORDS in kinds:
         wide = given.words.spec if given.words else DescriptorSpec(kind=DEFAULT_KIND)
         whole = first if given.matrix is not None or wide == spec else job(described(wide))
         several = learn_several(whole, seed, given.words)
+        cost = front_end_cost(whole, [one.load() for one in whole.test], several.dictionaries)
     training = len(given.training)
-    return Benchmark(encoded, training, train_models(encoded, training, cache), seed, second, several)
+    return Benchmark(encoded, training, train_models(encoded, training, cache), seed, second, several, cost)
 
 
 def check_methods(methods: Iterable[str] | None = None, *, described: bool = True) -> list[str]:
