@@ -33,7 +33,11 @@ def contents(folder: Path) -> dict[str, bytes]:
 def test_the_old_model_or_the_new_one(exchange: str) -> None:
     # Thousands of small files: in memory where there is such a folder.
     with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as root:
-        done = subprocess.run([sys.executable, __file__, root, exchange], capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-W", "ignore::DeprecationWarning", __file__, root, exchange],
+            capture_output=True,
+            text=True,
+        )
     assert (done.returncode, done.stderr) == (0, "")
     found = {name: int(count) for name, count in (item.split("=") for item in done.stdout.split())}
     # A test that kills too late, or always too early, proves nothing.
