@@ -69,9 +69,9 @@ class DictionarySet:
 
         `places`: the label of each row, "" where there is none. A map of the view `plain` is the one that
         `Dictionary.fit` learns with that size and seed, which tells of `descriptors`, `progress` (called for one map
-        after the other) and `work`. Descriptors without a label train maps, but no view `pn`; these are left out with
-        a warning where fewer than two places are labelled. Raises VisionError for unusable descriptors, and if no view
-        is left.
+        after the other) and `work`. Descriptors without a label train maps, but no view `pn`. Where fewer than
+        two places are labelled, views `pn` that were named are left out with a warning, and those of the default are
+        `half`. Raises VisionError for unusable descriptors, and if no view is left.
         """
         rows = training_rows(descriptors, spec, options.of_map(options.sizes[0]))
         labelled = len({*(places or ())} - {""}) > 1
