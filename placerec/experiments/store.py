@@ -13,7 +13,7 @@ models/KEY/          n-gram models of a comparison
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,18 +72,37 @@ def held_output(out: Path, cache: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Described:
-    """A sequence whose descriptors are in the file `kept`, which is named by a digest of images and descriptor."""
+    """A sequence whose descriptors are in the file `kept`, which is named by a digest of images and descriptor.
+
+    `spec`: of the descriptors that are wanted, and `whole`: of those in the file, of which these are a part; None where
+    they are all.
+    """
 
     sequence: FrameSequence
     spec: DescriptorSpec
     kept: Path
+    whole: DescriptorSpec | None = None
+
+    @property
+    def key(self) -> str:
+        """A digest of images and descriptors that are wanted."""
+        return self.kept.stem if self.spec == self._whole else key_of("part", self.kept.stem, self.spec.as_dict())
+
+    @property
+    def _whole(self) -> DescriptorSpec:
+        return self.whole or self.spec
+
+    def part(self, spec: DescriptorSpec) -> "Described":
+        """The sequence with those of the descriptors in the file that `spec` tells."""
+        return replace(self, spec=spec, whole=self._whole)
 
     def load(self) -> Descriptors:
         """The descriptors of the frames that could be read, with the times and labels that the sequence has now."""
         arrays, _ = read_npz(self.kept, ("descriptors", "rows"))
         frames = [self.sequence.frames[row] for row in arrays["rows"].tolist()]
         table = FrameTable.of_frames(self.sequence.name, frames)
-        return Descriptors(self.spec, arrays["descriptors"], table, len(self.sequence.frames) - len(frames))
+        skipped = len(self.sequence.frames) - len(frames)
+        return Descriptors(self._whole, arrays["descriptors"], table, skipped).part(self.spec)
 
 
 def describe_all(
@@ -195,17 +214,22 @@ class WordsJob:
     options: DictionaryOptions
     cache: Path
 
+    def part(self, spec: DescriptorSpec) -> "WordsJob":
+        """The job with some of the descriptors that were made of its sequences (`Described.part`)."""
+        train, test = (tuple(one.part(spec) for one in some) for some in (self.train, self.test))
+        return replace(self, train=train, test=test)
+
     @property
     def words(self) -> Path:
         """The dictionary's file."""
-        key = key_of("words", [one.kept.stem for one in self.train], asdict(self.options))
+        key = key_of("words", [one.key for one in self.train], asdict(self.options))
         return self.cache / "words" / f"{key}.npz"
 
     @property
     def labels(self) -> list[object]:
         """All that is known of the frames but for the words, as a part of a key."""
         return [
-            (one.sequence.name, one.kept.stem, [(f.name, repr(f.time), f.place) for f in one.sequence.frames])
+            (one.sequence.name, one.key, [(f.name, repr(f.time), f.place) for f in one.sequence.frames])
             for one in (*self.train, *self.test)
         ]
 

@@ -199,7 +199,8 @@ def test_progress_tells_frames_and_methods(runs: Path, tmp_path: Path) -> None:
         yield lambda done, total: seen.setdefault(label, []).append((done, total))
 
     compare([runs / "run0"], [runs / "run1"], tmp_path / "out", methods=["hohmm", "majority"], size=2, progress=bar)
-    assert seen["describe (gist)"] == [(12, 24), (24, 24)]
+    assert list(seen) == ["describe (gist+lbp+ranks)", "methods", "pictures"]
+    assert seen["describe (gist+lbp+ranks)"] == [(12, 24), (24, 24)]
     assert seen["methods"] == [(1, 2), (2, 2)]
 
 

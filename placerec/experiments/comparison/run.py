@@ -160,7 +160,12 @@ def _benchmark(
 
     dictionary = _plain(given.words) if given.words else None
     spec = dictionary.spec if dictionary else None
-    first = job(described(spec or SPEC) if given.matrix is None else keep_given(given.every, spec, given.matrix, cache))
+    if given.matrix is not None:
+        whole = first = job(keep_given(given.every, spec, given.matrix, cache))
+    else:
+        # What several dictionaries see of a frame holds what the other methods do.
+        whole = job(described(given.words.spec if given.words else DescriptorSpec(kind=DEFAULT_KIND)))
+        first = whole.part(spec or SPEC)
     learned = {one.kept for one in first.train}
     warn_of_training([one.sequence.name for one in first.test if one.kept in learned], "words and the models")
     encoded = encode(first, dictionary or first.dictionary(), {COMPARED[name].view for name in methods})
@@ -171,8 +176,6 @@ def _benchmark(
         second = encode(other, other.dictionary(), ())
     several, cost = None, None
     if SEVERAL_WORDS in kinds:
-        wide = given.words.spec if given.words else DescriptorSpec(kind=DEFAULT_KIND)
-        whole = first if given.matrix is not None or wide == spec else job(described(wide))
         several = learn_several(whole, seed, given.words)
         cost = front_end_cost(whole, [one.load() for one in whole.test], several.dictionaries)
     training = len(given.training)

@@ -1,15 +1,15 @@
 """The system of `placerec learn` on the folds of a grid: a line to compare the paper's cells with."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from placerec.experiments.grid.cells import GridJob, judged
 from placerec.experiments.grid.results import LearnedRow
 from placerec.experiments.several import learn_several
-from placerec.experiments.store import WordsJob, describe_all, key_of, load, save
-from placerec.jobs import ProgressBar, map_jobs, workers
+from placerec.experiments.store import WordsJob, key_of, load, save
+from placerec.jobs import ProgressBar, map_jobs
 from placerec.methods import HOHMM, make_decoder
 from placerec.vision import DEFAULT_KIND, DescriptorSpec, DictionarySetOptions
 
@@ -40,28 +40,17 @@ def learn_folds(grid: Sequence[GridJob], *, jobs: int, progress: ProgressBar) ->
 
     A result that is kept is not computed again. `jobs`: processes.
     """
-    todo = {(job.seed, job.fold.name): LearnedJob(job.seed, job.fold.name, job.images) for job in grid if job.images}
+    # The cells have the paper's descriptors, a part of these.
+    todo = {
+        (job.seed, job.fold.name): LearnedJob(job.seed, job.fold.name, job.images.part(SPEC))
+        for job in grid
+        if job.images
+    }
     if not todo:
         return []
-    wide = _described([*todo.values()], jobs, progress)
     with progress("learn and recognise") as show:
-        found = map_jobs(run_learned, wide, jobs=jobs, progress=show)
+        found = map_jobs(run_learned, [*todo.values()], jobs=jobs, progress=show)
     return sorted((_row(job, one) for job, one in zip(todo.values(), found, strict=True)), key=lambda row: row[:2])
-
-
-def _described(todo: Sequence[LearnedJob], jobs: int, progress: ProgressBar) -> list[LearnedJob]:
-    """The jobs with the descriptors that `placerec learn` takes, where the grid has those of the paper."""
-    every = {one.sequence.name: one.sequence for job in todo for one in (*job.images.train, *job.images.test)}
-    with progress("describe") as show:
-        cache, work = todo[0].images.cache, workers(jobs)
-        found = describe_all([*every.values()], SPEC, cache, together=1, work=work, progress=show)
-    of = {one.sequence.name: one for one in found}
-
-    def wide(job: LearnedJob) -> LearnedJob:
-        train, test = (tuple(of[one.sequence.name] for one in some) for some in (job.images.train, job.images.test))
-        return replace(job, images=replace(job.images, train=train, test=test))
-
-    return [wide(job) for job in todo]
 
 
 def run_learned(job: LearnedJob) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 from placerec.errors import ExperimentError
 from placerec.experiments.grid.cells import KEPT, CellJob, GridCell, GridJob, run_cells
 from placerec.experiments.grid.config import Config, read_config
-from placerec.experiments.grid.learned import learn_folds
+from placerec.experiments.grid.learned import SPEC as LEARNED_SPEC, learn_folds
 from placerec.experiments.grid.report import write_reports
 from placerec.experiments.grid.results import COLUMNS, Results, Row, SequenceCount, write_learned, write_results
 from placerec.experiments.grid.splits import SPLITS, Fold, named_tests
@@ -72,8 +72,10 @@ def _image_jobs(plan: Config, out: Path, jobs: int, progress: ProgressBar) -> It
     sequences = find_images(plan.sequences, plan.folder)
     folds = _folds(plan, [sequence.name for sequence in sequences])
     with progress("describe") as show:
-        described = describe_all(sequences, SPEC, out / "cache", together=1, work=workers(jobs), progress=show)
-    of = {one.sequence.name: one for one in described}
+        # What `placerec learn` sees of a frame holds what the paper's cells do.
+        wide = SPEC if plan.as_in_paper else LEARNED_SPEC
+        described = describe_all(sequences, wide, out / "cache", together=1, work=workers(jobs), progress=show)
+    of = {one.sequence.name: one.part(SPEC) for one in described}
     todo = {}
     for size, seed, fold in product(plan.size, range(plan.seeds), folds):
         train, test = (tuple(of[name] for name in names) for names in (fold.train, fold.test))
