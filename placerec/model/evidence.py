@@ -67,7 +67,7 @@ class PlaceCounts:
             frames.update(part.frames)
             steps.update(part.steps)
             for key, text in part.sentences.items():
-                sentences[key] = [*sentences.get(key, []), *text]
+                sentences.setdefault(key, []).extend(text)
         return PlaceCounts(ngrams, frames, steps, sentences)
 
 
@@ -86,7 +86,7 @@ def count_places(
             counted = count_ngrams(text, options.order, vocabulary=vocabularies[key[0]], markers=options.markers)
             ngrams[key] = add_counts(ngrams[key], counted) if key in ngrams else counted
             if options.holds_out:
-                kept[key] = [*kept.get(key, []), *text]
+                kept.setdefault(key, []).extend(text)
         waiting.clear()
 
     for stream in streams:
