@@ -169,11 +169,9 @@ class Kind:
     """A kind of descriptor: the settings of `DescriptorSpec` that it has, its number of values, and what makes it.
 
     `describe`: makes it of what `fit` leaves of an image, exact zeros of a constant one; None if it is computed
-    elsewhere. Without a length, a file tells it. `colours`: whether it is made of colours. `told`: what it is, in a
-    line.
+    elsewhere. Without a length, a file tells it. `colours`: whether it is made of colours.
     """
 
-    told: str
     settings: tuple[str, ...]
     length: int | None = None
     describe: Callable[[NDArray[Any], DescriptorSpec], Singles] | None = None
@@ -185,31 +183,26 @@ _FITTED = ("image_size", "fit")
 # Another descriptor is added here.
 KINDS = {
     "gist": Kind(
-        "energy of 4 scales x 6 orientations in 4 x 4 blocks (Oliva and Torralba)",
         ("variant", *_FITTED),
         4 * 6 * 4 * 4,
         lambda gray, spec: gist(gray, variant=spec.variant),
     ),
     "lbp": Kind(
-        "shares of local binary patterns of the smoothed image in 2 x 2 windows (Ojala)",
         _FITTED,
         BINARY,
         lambda gray, spec: lbp(gray),
     ),
     "ranks": Kind(
-        "the order of 12 x 12 cells from dark to bright",
         _FITTED,
         CELLS,
         lambda gray, spec: ranks(gray),
     ),
     "centrist": Kind(
-        "shares of the census transform's codes in 2 x 2 windows (Wu and Rehg)",
         _FITTED,
         CENTRIST,
         lambda gray, spec: centrist(gray),
     ),
     "colour": Kind(
-        "colours of 6 x 6 cells beside each other, whatever the light",
         (),
         RATIOS,
         lambda grid, spec: describe_grid(grid),
@@ -217,14 +210,13 @@ KINDS = {
         colours=True,
     ),
     "onnx": Kind(
-        "an image network in an ONNX file",
         ("network",),
         None,
         lambda fitted, spec: describe_fitted(_network(spec), fitted),
         _fit_network,
         colours=True,
     ),
-    "npy": Kind("computed elsewhere, a row a frame", ("columns",)),
+    "npy": Kind(("columns",)),
 }
 
 

@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from helpers.small_world import write_images
 from helpers.typed_commands import done, fails
 
+from placerec.cli import commands
 from placerec.errors import OutputError, VisionError
 from placerec.frames import find_sequences, read_gray
 from placerec.vision.light import LIGHTS, relight, relit
@@ -86,3 +88,9 @@ def test_what_something_else_wrote_is_not_replaced(tmp_path: Path) -> None:
     with pytest.raises(VisionError, match="no simulated light is called 'dusk'; choose one of dim, warm, lamp, exp"):
         relight([run], tmp_path / "new", "dusk")
     fails("no sequence there", "relight", tmp_path / "out", "-o", tmp_path / "new", "--light", "dim")
+
+
+def test_the_command_offers_every_light() -> None:
+    (light,) = [one for one in commands.commands["relight"].params if one.name == "light"]
+    assert isinstance(light.type, click.Choice)
+    assert [*light.type.choices] == [*LIGHTS]

@@ -1,13 +1,15 @@
 """Specifications: what each kind has, what it has not, and the way into files and back."""
 
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from placerec.cli.shared import descriptors
 from placerec.errors import VisionError
-from placerec.vision import DescriptorSpec, descriptor
+from placerec.vision import KINDS, DescriptorSpec, descriptor
 from placerec.vision.network import Network
 
 SPECS = [
@@ -79,3 +81,9 @@ def test_what_does_not_exist_is_refused(settings: dict[str, Any], message: str) 
 def test_images_are_not_described_by_a_matrix() -> None:
     with pytest.raises(VisionError, match=r"\(768 values\) were computed elsewhere.*; tokenize with --descriptor npy:"):
         descriptor(np.zeros((20, 20), np.uint8), SPECS[3])
+
+
+def test_the_commands_and_the_page_have_every_kind() -> None:
+    assert tuple(kind for kind in KINDS if kind not in ("onnx", "npy")) == descriptors.KINDS
+    page = (Path(__file__).parents[2] / "docs/vision.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `(\w+)[^|]*` \|[^|]*\|[^|]*\|[^|]*\|$", page, re.MULTILINE) == [*KINDS]
