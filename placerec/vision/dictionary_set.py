@@ -2,7 +2,7 @@
 
 import hashlib
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -83,7 +83,8 @@ class DictionarySet:
         for part in dict.fromkeys(view.part_of(spec) for view in views):
             own = replace(rows, source=some_columns(rows.source, spec.columns_of(part)))
             wanted = {view.projection: view for view in views if view.part_of(spec) == part}
-            for projection, maps in _fit_part(own, part, places, [*wanted], options, progress, work).items():
+            told = {projection: view.told_in(spec) for projection, view in wanted.items()}
+            for projection, maps in _fit_part(own, part, places, told, options, progress, work).items():
                 if isinstance(maps, str):
                     missing[wanted[projection]] = maps
                 else:
@@ -196,12 +197,15 @@ def _fit_part(
     rows: TrainingRows,
     spec: DescriptorSpec,
     places: Sequence[str] | None,
-    projections: Iterable[str],
+    projections: Mapping[str, str],
     options: DictionarySetOptions,
     progress: EpochProgress | None,
     work: Executor | None,
 ) -> dict[str, list[Dictionary] | str]:
-    """For every projection of some descriptors the dictionaries of all sizes, or why it cannot be learned."""
+    """For every projection of some descriptors the dictionaries of all sizes, or why it cannot be learned.
+
+    `projections`: what the view of each is called.
+    """
     pca = fit_blocks(moments(rows.source, work), spec.lengths, options.components)
 
     def learned(codes: SpooledRows, pca: Pca) -> list[Dictionary]:
@@ -218,7 +222,7 @@ def _fit_part(
         if "plain" in projections:
             of_projection["plain"] = learned(codes, pca)
         if "pn" in projections:
-            others["pn"] = _normalised(pca, codes, rows, places, work)
+            others["pn"] = _normalised(pca, codes, rows, places, projections["pn"], work)
     for projection, found in others.items():
         if isinstance(found, str):
             of_projection[projection] = found
@@ -229,12 +233,17 @@ def _fit_part(
 
 
 def _normalised(
-    pca: Pca, codes: SpooledRows, rows: TrainingRows, places: Sequence[str] | None, work: Executor | None
+    pca: Pca,
+    codes: SpooledRows,
+    rows: TrainingRows,
+    places: Sequence[str] | None,
+    told: str,
+    work: Executor | None,
 ) -> Pca | str:
     """The place-normalised projection, or why the labels do not give one."""
     numbers = place_numbers(places, codes.rows if rows.kept is None else len(rows.kept))
     try:
-        return place_normalised(pca, codes, numbers if rows.kept is None else numbers[rows.kept], work)
+        return place_normalised(pca, codes, numbers if rows.kept is None else numbers[rows.kept], work, told=told)
     except VisionError as error:
         return str(error)
 

@@ -108,18 +108,21 @@ def place_numbers(places: Sequence[str] | None, n: int) -> Ints:
     return labels.codes(sorted(set(labels) - {""}))
 
 
-def place_normalised(pca: Pca, codes: SpooledRows, places: Ints, work: Executor | None = None) -> Pca:
+def place_normalised(
+    pca: Pca, codes: SpooledRows, places: Ints, work: Executor | None = None, *, told: str = "pn"
+) -> Pca:
     """The projection whose coordinates have variance 1 about the means of places, largest variance of all rows first.
 
     `codes`: the rows (n, k) as `pca` projects them. `places` (n,): the number of each one's place, -1 for none; those
-    count as rows alone. `work`: other machines, if there are any, take the chunks. Raises VisionError where no two
-    places are labelled, or no two frames of a place differ.
+    count as rows alone. `work`: other machines, if there are any, take the chunks. `told`: what the view is called in
+    what is noted. Raises VisionError where no two places are labelled, or no two frames of a place differ.
     """
     found = place_scatter(codes, places, work)
     if np.trace(found.covariance) <= np.finfo(np.float32).eps * pca.variances.sum(dtype=np.float64):
         raise VisionError("it needs places with frames that differ, and all that are labelled are like their place's")
     log.info(
-        "view pn: from %d labelled frames of %d places, their covariance shrunk by %.2f",
+        "view %s: from %d labelled frames of %d places, their covariance shrunk by %.2f",
+        told,
         found.n,
         found.places,
         found.shrinkage(),

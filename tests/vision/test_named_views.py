@@ -1,5 +1,6 @@
 """Views by name: several descriptors of a frame in one row, and dictionaries of some of its columns."""
 
+import logging
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,6 +39,16 @@ def values() -> np.ndarray:
 def fit(values: np.ndarray, *views: str, spec: DescriptorSpec = SPEC) -> DictionarySet:
     options = DictionarySetOptions(views, (2, 3), components=8)
     return DictionarySet.fit(values, spec=spec, places=PLACES, options=options)
+
+
+def test_every_view_is_told_by_its_name(values: np.ndarray, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, logger="placerec.vision.views"):
+        fit(values)
+    assert [message.split(":", 2)[:2] for message in caplog.messages if message.startswith("view ")] == [
+        ["view gist", "pn"],
+        ["view lbp", "pn"],
+        ["view ranks", "pn"],
+    ]
 
 
 def test_a_joined_descriptor_is_its_parts_one_behind_the_other(values: np.ndarray) -> None:
