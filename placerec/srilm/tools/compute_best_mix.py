@@ -17,8 +17,8 @@ TOOL = "compute-best-mix"
 USAGE = 'usage: {tool} [lambda="L1 L2 ..."] [precision=P] PPL1 PPL2 ...  (outputs of ngram -debug 2 -ppl)'
 # Beyond this, exp ends.
 _MOST = 709.0
-# The line of a token: the word, whether the model does not know it, log10 p, and how often it counts.
-TOKEN_LINE = re.compile(r"\tp\( (\S+) \| .*?(\[OOV\])?(?: \S*)? \[ (\S+)(?: \*(\S+))? \](?: / \S+)?\s*$")
+# The line of a token: the word, what stands before its log10 p, this, and how often it counts.
+TOKEN_LINE = re.compile(r"\tp\( (\S+) \| (.*) \[ (\S+)(?: \*(\S+))? \](?: / \S+)?\s*$")
 
 
 @exit_status
@@ -67,9 +67,9 @@ def _tokens(names: Sequence[str], streams: Streams, tool: str) -> tuple[Floats, 
     """What each model gives each token, log10, float64 (M, T), and how often each occurs, (T,)."""
     columns = []
     for name in names:
-        found = [match for match in map(TOKEN_LINE.match, streams.lines(name)) if match]
-        log10_p = [_log10(match[3]) for match in found]
-        columns.append((np.array(log10_p), np.array([_count(match[4]) for match in found])))
+        found = [match.group(3, 4) for match in map(TOKEN_LINE.match, streams.lines(name)) if match]
+        log10_p = [_log10(text) for text, _ in found]
+        columns.append((np.array(log10_p), np.array([_count(times) if times else 1.0 for _, times in found])))
         if len(found) != len(columns[0][0]):
             raise SrilmError(f"mismatch in number of samples ({len(columns[0][0])} != {len(found)})")
     return np.array([log10_p for log10_p, _ in columns]).reshape(len(names), -1), columns[0][1]
@@ -82,8 +82,8 @@ def _log10(text: str) -> float:
     return min(max(LEAST_LOG10, value), -LEAST_LOG10 / 2)
 
 
-def _count(text: str | None) -> float:
-    value = leading_float(text) if text else None
+def _count(text: str) -> float:
+    value = leading_float(text)
     return value if value is not None and 0 <= value < math.inf else 1.0
 
 

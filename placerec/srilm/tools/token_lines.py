@@ -5,6 +5,7 @@ prints, compare-ppls a line that names its numbers.
 """
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import NamedTuple
@@ -16,6 +17,9 @@ from placerec.srilm.text.streams import SrilmError, Streams, exit_status
 from placerec.srilm.tools.assignments import split_assignments
 from placerec.srilm.tools.compute_best_mix import TOKEN_LINE
 from placerec.srilm.tools.reports import totals_block
+
+# The tag in front of p.
+_UNKNOWN_TAG = re.compile(r"\[OOV\](?: \S*)?$")
 
 
 class Token(NamedTuple):
@@ -32,7 +36,7 @@ def tokens_in(name: str, streams: Streams, tool: str) -> Iterator[Token]:
     lines = streams.lines(name)
     for line in lines:
         if match := TOKEN_LINE.match(line):
-            word, unknown = match[1], match[2] is not None or match[1] == UNKNOWN
+            word, unknown = match[1], match[1] == UNKNOWN or _UNKNOWN_TAG.search(match[2]) is not None
             log10_p, times = leading_float(match[3]), leading_float(match[4] or "1")
             if log10_p is None or math.isnan(log10_p) or log10_p == math.inf or times is None:
                 raise SrilmError(f"{tool}: {lines.position}{line.strip()!r} has no log probability")
