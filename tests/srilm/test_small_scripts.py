@@ -288,6 +288,9 @@ def test_a_model_that_is_reversed_scores_sentences_backwards(texts: Path) -> Non
     ]
     totals = [re.findall(r"[-\d.]+", text.partition(":")[2]) for text in found]
     assert [float(n) for n in totals[1]] == pytest.approx([float(n) for n in totals[0]], rel=1e-5)
+    Path("inf.lm").write_text(Path("m.lm").read_text().replace("-99\t<s>", "-inf\t<s>"))
+    assert "-inf" in Path("inf.lm").read_text()
+    assert call(reverse_lm, "inf.lm") == (0, reversed_model, "")
     assert call(reverse_lm, stdin=LM)[::2] == (
         1,
         "reverse-lm: only bigram models are reversed; see make-sub-lm maxorder=2\n",

@@ -47,10 +47,7 @@ def arpa_lines(lines: Iterable[tuple[int, str]], name: str, tool: str) -> Iterat
 
 def p_of_line(line: _Line, tool: str) -> float:
     """The probability of an n-gram, 0 for the stand-ins of log 0; SrilmError where there is no logarithm of one."""
-    text = tokens(line.text)[0]
-    value = leading_float(text)
-    if value is None or not value <= _MOST_LOG10:
-        raise SrilmError(f"{tool}: {text!r} of {' '.join(line.ngram)!r} is no log probability")
+    value = _log10_in(line, 0, tool)
     return 0.0 if value <= ABOUT_LOG_ZERO else float(10**value)
 
 
@@ -161,9 +158,9 @@ def _mirrored(word: str) -> str:
 
 
 def _log10_in(line: _Line, place: int, tool: str) -> float:
-    """The number in front of an n-gram (place 0) or behind it; 0 where none stands behind it."""
+    """The number in front of an n-gram (place 0) or behind it; 0 where none stands behind it, -308 for -inf."""
     fields = tokens(line.text)
     value = leading_float(fields[place]) if place < len(fields) else 0.0
-    if value is None or not abs(value) <= _MOST_LOG10:
-        raise SrilmError(f"{tool}: {fields[place]!r} of {' '.join(line.ngram)!r} is no logarithm")
-    return value
+    if value is None or not value <= _MOST_LOG10:
+        raise SrilmError(f"{tool}: {fields[place]!r} of {' '.join(line.ngram)!r} is no log probability")
+    return max(value, -_MOST_LOG10)
