@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from placerec.lm import BackoffModel, count_ngrams
 from placerec.model import estimate_place
 from placerec.model.options import ModelOptions
 from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.run import function_of
 from placerec.vision import Dictionary, DictionaryOptions
 from placerec.words import Selection, WordStream, place_steps, sentences_per_place
 from placerec.words.tokenize import tokens_of
@@ -67,11 +67,9 @@ def run(folder: Path, tool: str, *arguments: str, **files: str) -> str:
     """The output of one of SRILM's tools, run on files in a folder; `files`: texts that are written there before."""
     for name, text in files.items():
         (folder / name).write_text(text, "utf-8")
-    module = tool.replace("-", "_")
     streams = Streams(BytesIO(), out := BytesIO(), err := BytesIO())
     paths = [str(folder / argument) if argument.endswith(FILES) else argument for argument in arguments]
-    status = getattr(import_module(f"placerec.srilm.tools.{module}"), module)(paths, streams)
-    if status:
+    if function_of(tool)(paths, streams):
         raise SystemExit(f"{tool} {' '.join(arguments)}: {err.getvalue().decode()}")
     return out.getvalue().decode()
 

@@ -3,21 +3,20 @@
 import gzip
 import json
 from collections.abc import Sequence
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from placerec.srilm.text.streams import Streams
+from placerec.srilm.tools.run import function_of
 
 Case = dict[str, Any]
 
 
 def run_tool(tool: str, arguments: Sequence[str], stdin: bytes = b"") -> tuple[int, bytes, bytes]:
-    """The status, output and messages of a tool that has a module of its own."""
-    name = tool.replace("-", "_")
+    """The status, output and messages of a tool."""
     streams = Streams(BytesIO(stdin), out := BytesIO(), err := BytesIO())
-    status: int = getattr(import_module(f"placerec.srilm.tools.{name}"), name)(arguments, streams)
+    status = function_of(tool)(arguments, streams)
     return status, out.getvalue(), err.getvalue()
 
 

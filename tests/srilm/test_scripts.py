@@ -1,7 +1,6 @@
 """compute-best-mix, add-ppls and change-lm-vocab, and how tools are started."""
 
 import gzip
-import io
 import math
 import os
 import re
@@ -9,27 +8,20 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.srilm_runs import call
 
-from placerec.srilm.text.streams import SrilmError, Streams
+from placerec.srilm.text.streams import SrilmError
 from placerec.srilm.text.vocabulary import WordList
-from placerec.srilm.tools.add_ppls import add_ppls
-from placerec.srilm.tools.change_lm_vocab import change_lm_vocab, restricted
-from placerec.srilm.tools.compute_best_mix import best_mix, compute_best_mix, starting_weights
+from placerec.srilm.tools.change_lm_vocab import restricted
+from placerec.srilm.tools.compute_best_mix import best_mix, starting_weights
 from placerec.srilm.tools.run import TOOLS
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = ROOT / "bin"
-
-
-def call(tool: Callable[[Sequence[str], Streams], int], *arguments: str, stdin: bytes = b"") -> tuple[int, str, str]:
-    streams = Streams(io.BytesIO(stdin), out := io.BytesIO(), err := io.BytesIO())
-    status = tool(arguments, streams)
-    return status, out.getvalue().decode("latin-1"), err.getvalue().decode("latin-1")
 
 
 def scored(*log10_p: str) -> str:
@@ -63,7 +55,7 @@ def test_best_mix_of_nothing_keeps_the_start() -> None:
 
 
 def test_compute_best_mix_tells_its_steps_and_the_result(tmp_path: Path) -> None:
-    status, out, err = call(compute_best_mix, "precision=0.01", *two_models(tmp_path))
+    status, out, err = call("compute-best-mix", "precision=0.01", *two_models(tmp_path))
     assert status == 0
     # By hand: tokens (0.1, 0.01), (0.01, 0.1), (10^-0.5, 0.1), (0, 10^-0.5); the one without mass is left out.
     p = [(0.1, 0.01), (0.01, 0.1), (10**-0.5, 0.1), (0.0, 10**-0.5)]
@@ -86,7 +78,7 @@ def test_compute_best_mix_weighs_counts_and_reads_every_level(tmp_path: Path) ->
     (tmp_path / "a").write_text(
         "\tp( a |  ) \t= [1gram] 0.1 [ -1 *3 ]\n\tp( b | a b ) \t= [2gram] 0.1 [ -2 ] / 0.9999\n"
     )
-    status, out, _ = call(compute_best_mix, str(tmp_path / "a"), str(tmp_path / "a"), str(tmp_path / "a"))
+    status, out, _ = call("compute-best-mix", str(tmp_path / "a"), str(tmp_path / "a"), str(tmp_path / "a"))
     assert (status, out) == (
         0,
         "4 non-oov words, best lambda (0.5 0.25 0.25)\npairwise cumulative lambda (1 0.333333 0.25)\n",
@@ -97,7 +89,7 @@ def test_compute_best_mix_of_texts_that_differ(tmp_path: Path) -> None:
     first, _ = two_models(tmp_path)
     other = tmp_path / "c"
     other.write_text(scored("-1"))
-    status, _, err = call(compute_best_mix, first, str(other))
+    status, _, err = call("compute-best-mix", first, str(other))
     assert status == 1
     assert err == "mismatch in number of samples (5 != 1)\n"
 
@@ -131,7 +123,7 @@ def test_add_ppls_adds_the_totals() -> None:
         "w\n1 sentences, 5 words, 0 OOVs\n0 zeroprobs, logprob= -99 ppl= 1 ppl1= 1\n"
     )
     ppl = 10 ** (27.5 / 16)
-    assert call(add_ppls, stdin=blocks.encode()) == (
+    assert call("add-ppls", stdin=blocks.encode()) == (
         0,
         f"file TOTAL: 3 sentences, 15 words, 1 OOVs\n1 zeroprobs, logprob= -27.5 ppl= {ppl:g}\n",
         "",
@@ -140,8 +132,8 @@ def test_add_ppls_adds_the_totals() -> None:
 
 def test_add_ppls_where_nothing_was_scored() -> None:
     block = b"file a: 0 sentences, 2 words, 2 OOVs\n0 zeroprobs, logprob= 0 ppl= undefined ppl1= undefined\n"
-    assert call(add_ppls, stdin=block)[1].endswith("0 zeroprobs, logprob= 0 ppl= undefined\n")
-    assert call(add_ppls)[1] == "file TOTAL: 0 sentences, 0 words, 0 OOVs\n"
+    assert call("add-ppls", stdin=block)[1].endswith("0 zeroprobs, logprob= 0 ppl= undefined\n")
+    assert call("add-ppls")[1] == "file TOTAL: 0 sentences, 0 words, 0 OOVs\n"
 
 
 ARPA = """\\data\\
@@ -175,7 +167,7 @@ def test_n_grams_of_words_that_do_not_stand_alone_in_the_vocabulary_go(tmp_path:
     (tmp_path / "v").write_text("a\nb z\n")
     (tmp_path / "m.lm").write_text(ARPA)
     status, out, err = call(
-        change_lm_vocab, "-vocab", str(tmp_path / "v"), "-lm", str(tmp_path / "m.lm"), "-order", "2"
+        "change-lm-vocab", "-vocab", str(tmp_path / "v"), "-lm", str(tmp_path / "m.lm"), "-order", "2"
     )
     assert (status, err) == (
         0,
@@ -190,12 +182,12 @@ def test_change_lm_vocab_writes_a_model_of_the_vocabulary(tmp_path: Path) -> Non
     (tmp_path / "m.lm").write_text(ARPA)
     out = tmp_path / "out.lm"
     arguments = ["-vocab", str(tmp_path / "v"), "-lm", str(tmp_path / "m.lm"), "-write-lm", str(out), "-order", "2"]
-    status, _, err = call(change_lm_vocab, *arguments)
+    status, _, err = call("change-lm-vocab", *arguments)
     warnings = [f"-: line 14: warning: {n - 1} {k}-grams read, expected {n}" for k, n in ((1, 4), (2, 3))]
     assert (status, err.splitlines()) == (0, warnings)
     lines = dict(re.findall(r"^(\S+)\t(\S+)", out.read_text(), re.MULTILINE)[i][::-1] for i in range(4))
     assert lines == {"</s>": "-1", "<s>": "-99", "a": "-1", "c": f"{math.log10(0.8):.7g}"}
-    assert call(change_lm_vocab, *arguments, "-subset")[0] == 0
+    assert call("change-lm-vocab", *arguments, "-subset")[0] == 0
     assert "\tc" not in out.read_text()
 
 
@@ -204,7 +196,7 @@ def test_change_lm_vocab_that_only_adds_words_is_ngram_renorm(shared: Path, tmp_
     model = golden / "expected/nc-vwsmall-wbi-o4/x.lm"
     (tmp_path / "x.lm.gz").write_bytes(model.read_bytes() if model.exists() else Path(f"{model}.gz").read_bytes())
     arguments = ["-lm", f"{tmp_path}/x.lm.gz", "-vocab", f"{golden}/inputs/vocab_vw_all.txt", "-order", "4"]
-    status, out, _ = call(change_lm_vocab, *arguments)
+    status, out, _ = call("change-lm-vocab", *arguments)
     expected = golden / "expected/ng-vocab-renorm2/y.lm"
     whole = gzip.decompress(Path(f"{expected}.gz").read_bytes()) if not expected.exists() else expected.read_bytes()
     assert (status, out) == (0, whole.decode("latin-1"))
@@ -213,13 +205,13 @@ def test_change_lm_vocab_that_only_adds_words_is_ngram_renorm(shared: Path, tmp_
 def test_the_search_survives_tokens_that_are_all_but_impossible(tmp_path: Path) -> None:
     (tmp_path / "a").write_text(scored("-1", "-319", "-inf", "-1e999"))
     (tmp_path / "b").write_text(scored("-1", "-inf", "-319", "-1"))
-    status, out, err = call(compute_best_mix, "lambda=0 1", str(tmp_path / "a"), str(tmp_path / "b"))
+    status, out, err = call("compute-best-mix", "lambda=0 1", str(tmp_path / "a"), str(tmp_path / "b"))
     assert (status, out.splitlines()[0]) == (0, "4 non-oov words, best lambda (0 1)")
     assert "nan" not in err
 
 
 def test_change_lm_vocab_needs_a_vocabulary() -> None:
-    status, _, err = call(change_lm_vocab, "-lm", "x")
+    status, _, err = call("change-lm-vocab", "-lm", "x")
     assert (status, err.split()[0]) == (0, "usage:")
 
 

@@ -7,7 +7,7 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 TOOLS = (
     "ngram-count",
@@ -68,18 +68,22 @@ def run(tool: str, arguments: Sequence[str], *, shown: str = "") -> int:
         return 1
 
 
-def _run(tool: str, arguments: Sequence[str], shown: str) -> int:
+def function_of(tool: str) -> Callable[..., int]:
+    """The function of one of TOOLS: of arguments, streams, and optionally the name in messages -> the exit status."""
     from importlib import import_module
 
+    name = tool.replace("-", "_")
+    found: Callable[..., int] = getattr(import_module(f"placerec.srilm.tools.{_TOGETHER.get(tool, name)}"), name)
+    return found
+
+
+def _run(tool: str, arguments: Sequence[str], shown: str) -> int:
     from placerec.errors import PlacerecError
     from placerec.srilm.text.streams import Streams
 
-    name = tool.replace("-", "_")
     streams = Streams(sys.stdin.buffer, sys.stdout.buffer, sys.stderr.buffer)
     try:
-        status = getattr(import_module(f"placerec.srilm.tools.{_TOGETHER.get(tool, name)}"), name)(
-            _latin(arguments), streams, _latin([shown])[0]
-        )
+        status = function_of(tool)(_latin(arguments), streams, _latin([shown])[0])
         streams.stdout.flush()
     except PlacerecError as error:
         streams.say(f"{shown}: {error}")
@@ -92,7 +96,7 @@ def _run(tool: str, arguments: Sequence[str], shown: str) -> int:
         streams.say(f"{shown}: standard output: {error.strerror or error}")
         _forget_output()
         return 1
-    return int(status)
+    return status
 
 
 def _latin(arguments: Sequence[str]) -> list[str]:
