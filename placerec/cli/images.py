@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from placerec.cli import shared
+from placerec.errors import counted
 
 if TYPE_CHECKING:
     from placerec.vision import DictionarySetOptions
@@ -193,4 +194,4 @@ def relight(sources: tuple[Path, ...], out: Path, light: str, **how: Any) -> Non
 
     with shared.progress_bar("relight") as progress:
         written = run(sources, out, light, progress=progress, **how)
-    click.echo(f"{written} frames in {out}", err=True)
+    shared.log.info("%s: %s", out, counted(written, "frame"))

@@ -512,6 +512,7 @@ def test_quiet_is_silent_and_other_commands_tell_what_they_did(world: Path, tmp_
             ("tokenize", world / "runs", "-w", world / "words.npz"),
             ("train-lm", world / "tokens"),
             ("decode", world / "tokens", "-m", world / "model"),
+            ("relight", world / "runs", "--light", "dim"),
         )
     ):
         told, quiet = (done(*args, "-o", tmp_path / f"{i}{q}", *q.split()) for q in ("", "-q"))
