@@ -18,8 +18,8 @@ from placerec.frames.layouts import COLD_CAMERA, COLD_LIST, COLD_LIST_FOLDER, fi
 from placerec.frames.places import check_place, check_twins, parse_places
 from placerec.frames.sequence import EPOCH, Sequence, SourceOptions
 
-# Of frames a second where they have no two times to tell it by.
-_RATE = 1.0
+# Seconds to the end of a frame where there are no two to tell it by.
+_STEP = 1.0
 
 
 @dataclass(frozen=True)
@@ -145,25 +145,25 @@ def _intervals(base: str, file: LabelFile, places: Ordered[str]) -> str:
     found = parse_intervals(split_lines(base), file.path)
     before = found.places_at(file.times, 0.0)
     edges = [*file.times, file.times[-1] + _step(file.times)] if file.times else []
-    kept: list[tuple[float, float, int]] = []
+    kept: list[tuple[float, int]] = []
     told = [False] * len(places)
     gone = set()
     for one in found.intervals:
         first, last = np.searchsorted(file.times, [one.start, one.end]).tolist()
         around = range(max(first - 1, 0), min(last + 1, len(places)))
         if all((places[i] == one.place) == (before[i] == one.place) for i in around):
-            kept.append((one.start, one.end, one.line))
+            kept.append((one.start, one.line))
             told[first:last] = [True] * (last - first)
         else:
             gone.add(one.line)
-    new: list[tuple[float, float, str]] = []
+    new: list[tuple[float, str]] = []
     for first, last, place in runs(["" if told[i] else place for i, place in enumerate(places)]):
-        later = min((start for start, _, _ in kept if start >= edges[first]), default=np.inf)
+        later = min((start for start, _ in kept if start >= edges[first]), default=np.inf)
         if place and (stop := min(edges[last], later)) > edges[first]:
-            new.append((edges[first], stop, f"{_seconds(edges[first])} {_seconds(stop)} {place}{end}"))
+            new.append((edges[first], f"{_seconds(edges[first])} {_seconds(stop)} {place}{end}"))
     added: dict[int, list[str]] = {}
-    for start, _, line in new:
-        earlier = [number for other, _, number in kept if other < start]
+    for start, line in new:
+        earlier = [number for other, number in kept if other < start]
         added.setdefault(max(earlier, default=0), []).append(line)
     woven = list(added.get(0, []))
     for number, line in enumerate(lines, start=1):
@@ -182,7 +182,7 @@ def runs(values: Ordered[str]) -> Iterator[tuple[int, int, str]]:
 
 def _step(times: Ordered[float]) -> float:
     steps = np.diff(times)
-    return max(round(float(np.median(steps)), 6), 1e-6) if len(steps) else 1 / _RATE
+    return max(round(float(np.median(steps)), 6), 1e-6) if len(steps) else _STEP
 
 
 def _seconds(value: float) -> str:
