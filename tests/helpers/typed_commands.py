@@ -5,7 +5,7 @@ from pathlib import Path
 
 from click.testing import CliRunner, Result
 
-from helpers.small_world import write_images
+from helpers.small_world import write_images, write_tokens
 from placerec.cli import commands
 
 SMALL = ("--as-in-paper", "--size", 3, "--image-size", 16, "-q")
@@ -50,3 +50,13 @@ def make_words(root: Path) -> None:
     done("train-words", root / "runs/seq1", "-o", root / "words.npz", *SMALL)
     done("tokenize", root / "runs", "-w", root / "words.npz", "-o", root / "seen", "-q")
     done("train-lm", root / "seen/seq1.tsv", "-o", root / "seen-model", "-q")
+
+
+def make_world(root: Path) -> Path:
+    """Two image sequences, a dictionary of each, tokens, models of words that need no image, and beliefs: in `root`."""
+    make_words(root)
+    done("train-words", root / "runs/seq2", "-o", root / "other.npz", *SMALL)
+    write_tokens(root / "tokens")
+    done("train-lm", root / "tokens/run1.tsv", root / "tokens/run2.tsv", "-o", root / "model", "-q")
+    done("decode", root / "tokens/run3.tsv", "-m", root / "model", "-o", root / "beliefs", "-q")
+    return root
