@@ -58,18 +58,9 @@ def decode(
 
     def opened() -> tuple[SequenceDecoder, list[WordStream], PlaceModels]:
         models = load_model(model)
-        own = models.folder.words
-        path = words or (own if own.exists() and are_images(sources) else None)
-        dictionary = None if path is None else _dictionary_for(sources, path, network)
+        dictionary = _dictionary_for(sources, words, models, network)
         decoder = make_decoder(method, models, options=options, scorer=scorer, dictionary=dictionary)
-        if dictionary is None:
-            streams, maker = token_streams(sources, models), dictionary_of(stream_files(sources))
-            trained: Collection[str] = maker.trained_on if maker else ()
-        else:
-            from placerec.words.tokenize import streams_of
-
-            streams = streams_of(sources, dictionary, source_options=source_options, cache=cache, progress=progress)
-            trained = dictionary.sequences
+        streams, trained = _streams_of(sources, models, dictionary, source_options, cache, progress)
         if out is None and len(streams) > 1:
             raise ModelError(f"{len(streams)} sequences to decode: name a folder for their beliefs with -o")
         _doubt(streams, models, trained, options)
@@ -103,8 +94,14 @@ def _write(
         write_text(folder / f"{stream.name}{EXPLAINED}", "".join(decisions))
 
 
-def _dictionary_for(sources: Sequence[Path | str], path: Path | str, network: Path | str | None) -> "DictionarySet":
-    """The dictionaries in `path`, for sources that are to be images."""
+def _dictionary_for(
+    sources: Sequence[Path | str], words: Path | str | None, models: PlaceModels, network: Path | str | None
+) -> "DictionarySet | None":
+    """The dictionaries in `words`, by default those of the models for images; None where token streams need none."""
+    own = models.folder.words
+    path = words or (own if own.exists() and are_images(sources) else None)
+    if path is None:
+        return None
     # Only images need OpenCV and scipy.
     from placerec.vision import DictionarySet
 
@@ -112,6 +109,24 @@ def _dictionary_for(sources: Sequence[Path | str], path: Path | str, network: Pa
         if is_stream(Path(source)):
             raise StreamError(f"{source}: is a token stream, which needs no dictionary; leave {path} out")
     return DictionarySet.load(path, network=network)
+
+
+def _streams_of(
+    sources: Sequence[Path | str],
+    models: PlaceModels,
+    dictionary: "DictionarySet | None",
+    source_options: SourceOptions,
+    cache: Path | str | None,
+    progress: Progress | None,
+) -> tuple[list[WordStream], Collection[str]]:
+    """The words of every sequence, and the names of the sequences that trained the words, as far as they are known."""
+    if dictionary is None:
+        streams, maker = token_streams(sources, models), dictionary_of(stream_files(sources))
+        return streams, maker.trained_on if maker else ()
+    from placerec.words.tokenize import streams_of
+
+    streams = streams_of(sources, dictionary, source_options=source_options, cache=cache, progress=progress)
+    return streams, dictionary.sequences
 
 
 def are_images(sources: Sequence[Path | str]) -> bool:
