@@ -76,7 +76,7 @@ class Bag:
         name = f"{self.path}: frame {self.listed[index].name} of {self.topic}"
         with opened(self.path) as reader:
             for codec, _, data in islice(stored_messages(reader, self.path, self.topic, when), before, None):
-                return shown_pixels(_image(codec, data, name, False))
+                return shown_pixels(_image(codec, data, name, True))
         return f"{name} cannot be read again"
 
     def _decoded(self, messages: Iterator[tuple[Codec, int, bytes]]) -> Iterator[tuple[int, Decoded]]:

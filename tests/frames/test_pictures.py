@@ -99,15 +99,17 @@ def test_a_frame_of_a_video_that_only_pyav_decodes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("storage", ["ros1", "sqlite3", "mcap"])
-def test_a_frame_of_a_bag(tmp_path: Path, storage: str) -> None:
-    shown = pictures(6)
+@pytest.mark.parametrize("encoding", ["bgr8", "mono8"])
+def test_a_frame_of_a_bag_is_in_the_colours_that_it_has(tmp_path: Path, storage: str, encoding: str) -> None:
+    shown = pictures(6) if encoding == "bgr8" else [as_gray(one) for one in pictures(6)]
     # Stored in another order than that of the stamps, two of them at once.
-    messages = [raw(as_gray(shown[i]), "mono8", START + i * STEP) for i in (0, 2, 1, 3, 5, 4)]
+    messages = [raw(shown[i], encoding, START + i * STEP) for i in (0, 2, 1, 3, 5, 4)]
     for message, stored in zip(messages, (0, 1, 1, 2, 3, 4), strict=True):
         message.stored = START + stored * STEP
     sequence = find_one(write_bag(tmp_path / ("run.bag" if storage == "ros1" else "run"), {"/c": messages}, storage))
     found = looked_at(sequence, [4, 1, 2, 0])
-    assert all(np.array_equal(picture, as_gray(shown[i])) for picture, i in zip(found, (4, 1, 2, 0), strict=True))
+    expected = [shown[i] if encoding == "bgr8" else np.dstack([shown[i]] * 3) for i in (4, 1, 2, 0)]
+    assert all(map(np.array_equal, found, expected))
 
 
 def test_files_are_read_in_colours_and_made_smaller(tmp_path: Path) -> None:
