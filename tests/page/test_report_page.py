@@ -1,7 +1,6 @@
 """The report in a browser: pointing, keys, filters, two systems, a narrow screen, paper."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from helpers.browser import chromium, complaints, picture_of, press, press_with, set_size
+from helpers.browser import complaints, picture_of, press, press_with, set_size
 from helpers.decoded_images import write_decoded_images
 from helpers.small_world import beliefs_of
 from helpers.waiting import wait_until
@@ -43,15 +42,8 @@ DRIVES = [
 ]
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium(1280, 800) as window:
-        yield window
-
-
 @pytest.fixture
 def page(browser: Any, tmp_path: Path) -> Any:
-    set_size(browser, 1280, 800)
     file = tmp_path / "report.html"
     file.write_text(report_page("Two drives", DRIVES), encoding="utf-8")
     browser.get(file.as_uri())
@@ -214,7 +206,6 @@ def test_a_drive_of_hours_is_stepped_through(browser: Any, tmp_path: Path) -> No
 def test_frames_words_and_reasons_of_a_real_model_are_shown(browser: Any, tmp_path: Path) -> None:
     root = write_decoded_images(tmp_path)
     report([root / "beliefs"], root / "r.html", frames=[root / "runs"], words=root / "words.npz")
-    set_size(browser, 1280, 800)
     browser.get((root / "r.html").as_uri() + "#run2/7")
     assert moment(browser).startswith("run2, frame 7")
     image = browser.find_element("css selector", ".moment .frame")
