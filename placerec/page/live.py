@@ -141,7 +141,8 @@ class LiveDesk:
     def took(self, frame: Frame, belief: Belief) -> str:
         """Remember the belief after a frame, keep the frame if its place is named, and return that place."""
         with self._lock:
-            place, live, given = self.place or frame.place, self._live, self._given
+            named, live, given = self.place, self._live, self._given
+            place = named or frame.place
             self._answered += 1
             row = {"k": self._answered, "t": frame.time, "b": belief.probability.tolist(), "u": belief.unknown}
             self._past.append(row | {"l": place, "w": belief.word, "p": belief.places})
@@ -151,7 +152,7 @@ class LiveDesk:
         shown = shown_pixels(live.image) if live is not None else ""
         if kept is not None and not isinstance(shown, str):
             try:
-                kept.add(frame, shown, *given, self.place)
+                kept.add(frame, shown, *given, named)
             except PlacerecError as error:
                 self.said, self.place = f"nothing more is kept: {error}", ""
                 log.warning("%s", error)
