@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from placerec.errors import MissingExtraError
+from placerec.errors import MissingExtraError, counted
 from placerec.evaluation.metrics import Evaluation, evaluate, place_order
 from placerec.evaluation.summary import percent
 from placerec.figures.canvas import place_title
@@ -114,7 +114,7 @@ def judge(drives: Sequence[Drive]) -> dict[str, Evaluation]:
 def headline(drives: Sequence[Drive], judged: Mapping[str, Evaluation]) -> list[str]:
     """The one number first, of the first system, and what it is to be read against."""
     frames = sum(len(drive.frames) for drive in drives)
-    what = f"{frames} frames of {len(drives)} drive{'s' * (len(drives) != 1)}"
+    what = f"{counted(frames, 'frame')} of {counted(len(drives), 'drive')}"
     if not judged:
         return [paragraph(f"{what}; none has a label, so that nothing can be said of what is right.")]
     name, first = next(iter(judged.items()))
@@ -123,9 +123,9 @@ def headline(drives: Sequence[Drive], judged: Mapping[str, Evaluation]) -> list[
     sentence = html.escape(f" of {first.frames} labelled frames right{by}; {always} would be ")
     numbers = [f"balanced accuracy {percent(first.balanced_accuracy)}", f"ECE {first.ece:.3f}"]
     if first.change_latency_frames is not None:
-        numbers.append(f"a new place noticed after {first.change_latency_frames:g} frames (median)")
+        numbers.append(f"a new place noticed after {counted(first.change_latency_frames, 'frame')} (median)")
     if first.unlabelled:
-        numbers.append(f"{first.unlabelled} frames without a label left out")
+        numbers.append(f"{counted(first.unlabelled, 'frame')} without a label left out")
     told = f"<strong>{percent(first.accuracy)}</strong>{sentence}{percent(first.majority_accuracy)}."
     below = html.escape(", ".join([what, *numbers]))
     return [f'<p class="headline">{told}</p>', f'<p class="soft">{below}.</p>']
