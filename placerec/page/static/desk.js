@@ -3,7 +3,8 @@
 const PAUSE = 2000; // milliseconds between two looks at what others write
 
 // `ask(path, sent)` -> JSON of the server, with `status`; `changed()` is called when something is to be shown anew,
-// `told(text, choices)` when something is to be said: choices are [text, action].
+// `told(text, choices)` when something is to be said: choices are [text, action]; what it returns takes that
+// away again.
 export function labelDesk(ask, changed, told) {
   const desk = { drives: [], places: [], now: 0, saving: 0, lost: false, round: 0, busy: false, said: "" };
   const done = [];
@@ -78,10 +79,11 @@ export function labelDesk(ask, changed, told) {
     const sent = { version: drive.version, stretches: drive.stretches };
     try {
       const answer = await ask(`labels/${number}`, sent);
-      drive.refused = answer.status !== 200;
+      drive.refused?.();
+      drive.refused = null;
       if (answer.status === 200) drive.version = answer.version;
       else if (answer.status === 409) conflict(drive, number, answer);
-      else told(`not saved: ${answer.error}`, [["try again", () => save(number)]]);
+      else drive.refused = told(`not saved: ${answer.error}`, [["try again", () => save(number)]]);
       desk.lost = false;
     } catch {
       desk.lost = true;
@@ -106,7 +108,7 @@ export function labelDesk(ask, changed, told) {
       }
       changed();
     };
-    told(`${drive.file}: ${theirs.error}.`, [["take that in", decide(false)], ["keep what is here", decide(true)]]);
+    told(`${theirs.error}.`, [["take that in", decide(false)], ["keep what is here", decide(true)]]);
   }
 
   function adopt(drive, number, { version, stretches }) {

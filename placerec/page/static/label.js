@@ -43,18 +43,24 @@ function element(tag, text, attributes = {}) {
   return made;
 }
 
+// A question stays until it is answered, or what is returned is called; of notices the newest is shown, below questions.
 function tell(text, choices) {
-  const line = byId("trouble");
-  line.replaceChildren(element("span", text));
-  for (const [name, action] of [...choices, ...(choices.length ? [] : [["well", () => {}]])]) {
+  const line = element("p", "", { class: choices.length ? "warn bar" : "warn bar notice" });
+  line.append(element("span", text));
+  for (const [name, action] of choices.length ? choices : [["well", () => {}]]) {
     const button = element("button", name);
     button.onclick = () => {
-      line.hidden = true;
+      line.remove();
       action();
     };
     line.append(button);
   }
-  line.hidden = false;
+  if (choices.length) byId("trouble").prepend(line);
+  else {
+    document.querySelector("#trouble .notice")?.remove();
+    byId("trouble").append(line);
+  }
+  return () => line.remove();
 }
 
 function show() {
@@ -67,13 +73,14 @@ function show() {
     stretches: [...labels.map(([a, b, place]) => [a, b, index(place)]), ...gaps(labels, drive.count).map((gap) => [...gap, -1])],
   }];
   if (page.proposal) {
+    desk.learnOf(page.proposal.map(([, , place]) => place));
     rows.push({ name: "proposed", faint: true, stretches: page.proposal.map(([a, b, place]) => [a, b, index(place)]) });
     if (page.doubt) rows.push({ name: "how unsure that is", levels: page.doubt });
   }
   strip.show({ count: drive.count, times: page.times.get(desk.now) ?? null, places: desk.places, rows });
   byId("file").textContent = drive.file;
   const missing = gaps(drive.stretches, drive.count).reduce((sum, [a, b]) => sum + b - a, 0);
-  const failed = drive.refused ? "not saved" : desk.lost ? "not saved: placerec does not answer" : "";
+  const failed = drive.refused || drive.conflict ? "not saved" : desk.lost ? "not saved: placerec does not answer" : "";
   const state = failed || (desk.saving ? "saving" : "saved");
   byId("saved").textContent = `${state}; ${missing ? `${missing} of ${drive.count} frames without a label` : "every frame has a label"}`;
   byId("saved").className = failed ? "warn" : "soft";
@@ -140,7 +147,6 @@ async function openDrive(number) {
   page.round = -1;
   if (desk.drive.timed && !page.times.has(number)) page.times.set(number, await numbers(`times/${number}`, Float64Array));
   strip.frame = 0;
-  byId("trouble").hidden = !byId("trouble").textContent || byId("trouble").hidden;
   show();
 }
 
@@ -152,7 +158,6 @@ async function fetchProposal() {
   if (number !== desk.now || !found.stretches) return;
   page.proposal = found.stretches;
   page.doubt = doubt;
-  desk.learnOf(found.stretches.map(([, , place]) => place));
   takeLooks(found);
   show();
 }
