@@ -38,7 +38,7 @@ def held_out_weights(counts: NgramCounts, n: int, predictable: Mask, sentences: 
     for tokens, lengths in numbered(sentences, lambda word: index.get(word, index[UNKNOWN]), markers):
         text.add(tokens, lengths)
     rows, visits, ids = _rows(text, counts, n)
-    predicted = predictable[ids] if len(ids) else np.zeros(0, bool)
+    predicted = predictable[ids]
     p = np.full(int(predicted.sum()), 1 / max(1, int(predictable.sum())))
     weights = np.full(BINS, 0.5)
     for k in range(1, n + 1):
@@ -91,8 +91,9 @@ def _held_out(
 
 def _own(sentence: Ints, row: Ints) -> Floats:
     """How often the sentence (m,) of each row (m,) has that row."""
-    _, inverse, often = np.unique(np.stack([sentence, row]), axis=1, return_inverse=True, return_counts=True)
-    return often[inverse.ravel()].astype(np.float64)
+    keys = sentence * (int(row.max(initial=0)) + 1) + row
+    _, inverse, often = np.unique(keys, return_inverse=True, return_counts=True)
+    return often[inverse].astype(np.float64)
 
 
 def _fitted(ratio: Floats, lower: Floats, bins: Ints) -> Floats:
