@@ -93,7 +93,8 @@ def _own(sentence: Ints, row: Ints) -> Floats:
     """How often the sentence (m,) of each row (m,) has that row."""
     keys = sentence * (int(row.max(initial=0)) + 1) + row
     _, inverse, often = np.unique(keys, return_inverse=True, return_counts=True)
-    return often[inverse].astype(np.float64)
+    own: Floats = often[inverse].astype(np.float64)
+    return own
 
 
 def _fitted(ratio: Floats, lower: Floats, bins: Ints) -> Floats:
