@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.arrays import Ints, Mask, Singles
+from placerec.arrays import Ints, Mask, Numbers, Singles
 from placerec.lm.row_index import RowIndex
 
 # A row an n-gram or a word: float32 (m,), whose sums are SRILM's, or float64, (m,) or of C models (m, C).
@@ -57,7 +57,7 @@ class Ngrams(NamedTuple):
     `listed` bool (m,): has a log10 p of its own, the others are contexts only; None: all have.
     """
 
-    words: NDArray[Any]
+    words: Numbers
     log10_p: Values
     backoff: Values
     is_context: Mask
@@ -261,7 +261,7 @@ class ScoreTables:
         rows = [np.argsort(keys) for keys in codes]
         return [(keys[row], row) for keys, row in zip(codes, rows, strict=True)]
 
-    def codes(self, words: NDArray[Any]) -> Ints:
+    def codes(self, words: Numbers) -> Ints:
         """The codes (m,) of n-grams, integers (m, n)."""
         codes = words[:, 0].astype(np.int64) + 1
         for table, word in zip(self.tables, words.T[1:], strict=False):

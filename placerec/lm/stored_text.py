@@ -16,13 +16,11 @@ from io import FileIO
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec.ahead import work_ahead
-from placerec.arrays import Ints, Mask
+from placerec.arrays import Ints, Mask, Numbers
 from placerec.errors import OutputError
 
-Numbers = NDArray[Any]
 # Words in a block: sorting what fits in a cache is faster.
 BLOCK = 1 << 18
 # Bytes of a text that are held in memory; the text before them goes to a temporary file.

@@ -11,14 +11,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.arrays import Floats, Ints, Mask
+from placerec.arrays import Floats, Ints, Mask, Numbers
 from placerec.lm.row_index import RowIndex
 from placerec.lm.vocabulary import Vocabulary
 
-# Integers of any type.
-Numbers = NDArray[Any]
 _NO_ROWS = np.zeros(0, np.int64)
 # Rows that are looked up at once: what is computed on the way stays in the processor's cache.
 _PART = 1 << 15
@@ -154,7 +151,7 @@ def distinct(keys: Sequence[Ints]) -> Ints:
     return runs(np.sort(np.concatenate([_NO_ROWS, *keys])))[0]
 
 
-def per_context(prefix: Ints, size: int, values: NDArray[Any] | None = None) -> Floats:
+def per_context(prefix: Ints, size: int, values: Numbers | None = None) -> Floats:
     """Sums float64 (size,) of `values` (default: ones) over the rows that share a prefix row."""
     return np.bincount(prefix, weights=values, minlength=size).astype(np.float64)
 

@@ -6,12 +6,11 @@ not handled here: `parse_block` gives None, and the reader goes the long way, li
 
 import re
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placerec.arrays import Floats, Ints, Mask, Singles
+from placerec.arrays import Floats, Ints, Mask, Numbers, Singles
 from placerec.lm.logs import LOG_ZERO
 from placerec.srilm.text.fields import FILLED, Fields, eight_digits, split_lines, with_odd_bytes
 
@@ -29,7 +28,7 @@ class Block(NamedTuple):
     """
 
     lines: Ints
-    words: NDArray[Any]
+    words: Numbers
     log10_p: Singles
     weighted: Mask
     backoff: Singles

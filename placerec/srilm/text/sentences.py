@@ -6,21 +6,18 @@ Lines are taken many at a time; line by line from where the first NUL, VT or FF 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from io import BytesIO
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from placerec.ahead import make_ahead
-from placerec.arrays import Ints, Mask
+from placerec.arrays import Ints, Mask, Numbers
 from placerec.lm.vocabulary import add_markers, find_markers
 from placerec.srilm.text.fields import comments, split_lines, usual_blocks, without_lines
 from placerec.srilm.text.numbering import Numbering
 from placerec.srilm.text.numbers import leading_float
 from placerec.srilm.text.streams import Lines, tokens
 from placerec.srilm.text.vocabulary import WordList
-
-if TYPE_CHECKING:
-    from placerec.lm.stored_text import Numbers
 
 LONGEST = 50000
 # Bytes read at once where lines are as programs write them, and words where they are not.
