@@ -61,9 +61,11 @@ def count_ngrams(
     With `markers`, every sentence is counted between `<s>` and `</s>`. With `vocabulary` it is closed: other
     words are counted as `<unk>`. No n-gram spans two sentences. The semantics are those of ngram-count
     (sections 3 and 4 of our SRILM specification). The sentences may be more than memory holds; OutputError if they
-    are, and a temporary file cannot be written.
+    are, and a temporary file cannot be written. LanguageModelError for an order below 1.
     """
     refuse_string(vocabulary, LanguageModelError)
+    if order < 1:
+        raise LanguageModelError(f"order {order} cannot be used; give 1 or more")
     numbers: defaultdict[str, int] = defaultdict(lambda: len(numbers))
     for word in (UNKNOWN, SENTENCE_START, SENTENCE_END, *(vocabulary or ())):
         numbers[word]

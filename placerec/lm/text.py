@@ -33,8 +33,6 @@ def train_ngrams(
         if not Path(text).exists():
             raise LanguageModelError(f"{text}: no such file; name a text, or give lists of words")
         text = (line.split() for line in read_lines(Path(text), LanguageModelError))
-    if order < 1:
-        raise LanguageModelError(f"order {order} cannot be used; give 1 or more")
     held_out: Sequence[Sequence[str]] = ()
     if smoothing == JELINEK_MERCER:
         text = held_out = [*text]

@@ -63,6 +63,7 @@ def test_a_vocabulary_and_no_markers() -> None:
         (lambda path: train_ngrams(["w1 w2"]), "a list of words, not a string"),
         (lambda path: train_ngrams([], markers=False), "the vocabulary holds no word that could be predicted"),
         (lambda path: train_ngrams(path, 0), "order 0 cannot be used; give 1 or more"),
+        (lambda path: count_ngrams(SENTENCES, -1), "order -1 cannot be used; give 1 or more"),
         (lambda path: train_ngrams(path, smoothing="kn"), "smoothing 'kn' is unknown; choose one of witten-bell"),
         (lambda path: train_ngrams(path, min_count=[0]), r"minimum counts \(0,\) must be 1 or more"),
     ],
