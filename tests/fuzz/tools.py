@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
+from tempfile import NamedTemporaryFile
 
 import mutations
 from harness import MODEL, fixed_model, run, same
@@ -176,8 +177,6 @@ def scored(rng: Random) -> bytes:
     text = mutations.text(rng)
     options = rng.choice(([], ["-unk"], ["-no-sos"]))
     # The model stands on standard input, and the text in a file of the system's: none of the case's own.
-    from tempfile import NamedTemporaryFile
-
     with NamedTemporaryFile() as file:
         file.write(text)
         file.flush()
