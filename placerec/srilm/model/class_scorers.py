@@ -22,7 +22,7 @@ Ngram = tuple[int, ...]
 class Definitions:
     """What classes stand for: `of` by class the expansions with their log10 P, `starting` by first word their classes.
 
-    Of equal expansions of a class the last one counts.
+    Of equal expansions of a class the last one counts. `longest`: how many words the longest one has.
     """
 
     def __init__(self, expansions: Iterable[Expansion], words: WordList) -> None:
@@ -34,6 +34,7 @@ class Definitions:
             value = 1.0 if p is None else p
             self.of.setdefault(number, {})[ngram] = math.log10(value) if value > 0 else -math.inf
             self.p[number, ngram] = value
+        self.longest = max((len(ngram) for _, ngram in self.p), default=1)
         self.starting: dict[int, list[tuple[int, float, Ngram]]] = {}
         for number, ngrams in self.of.items():
             for ngram, log10_p in ngrams.items():
@@ -224,8 +225,8 @@ class ClassView:
 
         That is exact where words tell their classes; else what stands further back would say more of a context.
         """
-        longest = max((len(ngram) for ngrams in self.model.definitions.of.values() for ngram in ngrams), default=1)
-        furthest: Ints = np.minimum(self.sequence.place, len(self.model.model.tables.tables) * longest - 1)
+        most = len(self.model.model.tables.tables) * self.model.definitions.longest - 1
+        furthest: Ints = np.minimum(self.sequence.place, most)
         return furthest
 
     def score(self, words: Ints | None = None) -> Scored:
