@@ -242,6 +242,16 @@ def test_counts_of_an_older_run_are_not_mixed_in(texts: Path) -> None:
     status, _, error = call("make-batch-counts", "list", "5")
     assert status == 1
     assert "counts/batch-2.ngrams.gz is of a run with more batches" in error
+    assert call("merge-batch-counts", "counts")[0] == 0
+    for size in ("9", "1"):
+        assert call("make-batch-counts", "list", size)[0] == 0
+        left = set(os.listdir("counts"))
+        status, _, error = call("merge-batch-counts", "counts")
+        assert (status, set(os.listdir("counts"))) == (1, left)
+        assert "counts/merge-iter2-1.ngrams.gz is of a run with other batches" in error
+    Path("counts/merge-iter2-1.ngrams.gz").unlink()
+    assert call("merge-batch-counts", "counts")[0] == 0
+    assert os.listdir("counts") == ["merge-iter3-1.ngrams.gz"]
     assert call("merge-batch-counts", "nowhere")[::2] == (
         1,
         "merge-batch-counts: nowhere: no counts to merge; see make-batch-counts\n",

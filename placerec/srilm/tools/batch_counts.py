@@ -21,7 +21,7 @@ from placerec.srilm.tools.ngram_merge import ngram_merge
 USAGE = "usage: {tool} FILE-LIST [BATCH-SIZE [FILTER [COUNT-DIR [options of ngram-count]]]]"
 MERGE_USAGE = "usage: {tool} [-float-counts] [-l N] COUNT-DIR [FILE-LIST|ITERATION]"
 _DEFAULTS = ("10", "cat", "counts")
-_BATCH = re.compile(r"batch-[0-9]+\.ngrams\.gz")
+_BATCH, _MERGED = re.compile(r"batch-[0-9]+\.ngrams\.gz"), re.compile(r"merge-iter[0-9]+-1\.ngrams\.gz")
 # Files that are merged at once: systems let a process open some hundred.
 _AT_ONCE = 64
 
@@ -40,7 +40,7 @@ def make_batch_counts(arguments: Sequence[str], streams: Streams, tool: str = "m
         raise SrilmError(f"{tool}: {arguments[0]}: no texts are listed")
     batches = [names[i : i + size] for i in range(0, len(names), size)]
     files = [f"{folder}/batch-{i}.ngrams.gz" for i in range(1, len(batches) + 1)]
-    older = sorted(set(_batches(folder)) - set(files))
+    older = sorted(set(_found(folder, _BATCH)) - set(files))
     if older:
         raise SrilmError(f"{tool}: {older[0]} is of a run with more batches; remove it, or name another folder")
     _make_folder(folder)
@@ -63,14 +63,17 @@ def merge_batch_counts(arguments: Sequence[str], streams: Streams, tool: str = "
     folder = rest[0]
     # A number restarts the merging in the middle, which begins anew here.
     listed = len(rest) > 1 and not rest[1].isdecimal()
-    files = _listed(rest[1], streams) if listed else _batches(folder)
+    files = _listed(rest[1], streams) if listed else _found(folder, _BATCH)
     if not files:
         raise SrilmError(f"{tool}: {rest[1] if listed else folder}: no counts to merge; see make-batch-counts")
+    final = files[0] if len(files) == 1 else f"{folder}/merge-iter{_iterations(len(files), width)}-1.ngrams.gz"
+    older = [] if listed else sorted(set(_found(folder, _MERGED)) - {final})
+    if older:
+        raise SrilmError(f"{tool}: {older[0]} is of a run with other batches; remove it, or name another folder")
     if len(files) == 1:
-        streams.say(f"final counts in {files[0]}")
+        streams.say(f"final counts in {final}")
         return 0
     _make_folder(folder)
-    final = f"{folder}/merge-iter{_iterations(len(files), width)}-1.ngrams.gz"
     with TemporaryDirectory(dir=path_of(folder)) as between:
         status = _merge(files, final, options, streams, tool, os.fsencode(between).decode("latin-1"))
     if status:
@@ -133,10 +136,10 @@ def _make_folder(name: str) -> None:
         raise SrilmError(f"{name}: {error.strerror or error}") from error
 
 
-def _batches(folder: str) -> list[str]:
-    """What make-batch-counts left in a folder, in the order of the batches."""
+def _found(folder: str, pattern: re.Pattern[str]) -> list[str]:
+    """The counts files of a folder that have such names, in the order of their numbers."""
     try:
-        names = [name for name in os.listdir(path_of(folder)) if _BATCH.fullmatch(name)]
+        names = [name for name in os.listdir(path_of(folder)) if pattern.fullmatch(name)]
     except FileNotFoundError:
         return []
     except OSError as error:
