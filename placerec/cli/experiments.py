@@ -24,7 +24,7 @@ from placerec.cli import shared
 @shared.words_option(False, "Your own dictionaries, where they are not to be learned from TRAIN.")
 @shared.network_option
 @shared.matrix_option
-@shared.size_option(20)
+@click.option("--size", type=click.IntRange(2, 200), default=20, help="Side of the map: size x size words.")
 @shared.seed_option("Another seed, another map.")
 @click.option(
     "--cache",

@@ -6,7 +6,6 @@ from placerec.cli.shared.common import (
     dictionary_option as dictionary_option,
     output_option as output_option,
     seed_option as seed_option,
-    size_option as size_option,
     words_option as words_option,
 )
 from placerec.cli.shared.decoding import decoding_options as decoding_options
@@ -35,10 +34,6 @@ from placerec.cli.shared.values import (
     FILE as FILE,
     PATH as PATH,
     PATH_OR_STREAM as PATH_OR_STREAM,
-    Command as Command,
-    FiniteRange as FiniteRange,
-    PathType as PathType,
-    listed as listed,
     usage as usage,
 )
 from placerec.cli.shared.words import dictionary_options as dictionary_options

@@ -8,12 +8,6 @@ from placerec.cli.shared.groups import OptionMaker
 from placerec.cli.shared.values import FILE, PATH, Command
 
 
-def size_option(default: int) -> Callable[[Command], Command]:
-    """--size: of the map."""
-    text = "Side of the map: size x size words."
-    return click.option("--size", type=click.IntRange(2, 200), default=default, help=text)
-
-
 def as_in_paper(option: OptionMaker, text: str, **values: str) -> Callable[[Command], Command]:
     """--as-in-paper: other defaults for some options, by the names of their parameters; what is given wins."""
 

@@ -102,9 +102,10 @@ def descriptor_options(function: Command) -> Command:
         for name in given.difference(known):
             raise click.UsageError(f"--{name.replace('_', '-')} says nothing about {kind} descriptors; leave it out")
         # What nobody asked for is the default, or what a file of descriptors holds.
-        asked = (descriptor or given or _KEPT in context.meta) and not matrix
-        if asked and _KEPT in context.meta:
-            settings["network"] = _opened(context.meta[_KEPT])
+        network = context.meta.get(_KEPT)
+        asked = (descriptor or given or network) and not matrix
+        if asked and network:
+            settings["network"] = _opened(network)
         settings = {name: settings[name] for name in known if name in settings}
         spec = DescriptorSpec(kind=kind, **settings) if asked else None
         return function(*args, spec=spec, matrix=matrix, **options)

@@ -8,21 +8,18 @@ import click
 from placerec.cli.shared import groups
 from placerec.cli.shared.common import seed_option
 from placerec.cli.shared.descriptors import take_network
-from placerec.cli.shared.values import Command, FiniteRange, listed
+from placerec.cli.shared.values import Command, FiniteRange, listed, usage
 
 
 def _views(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[str, ...]:
     if not value:
         return ()
-    from placerec.errors import VisionError
     from placerec.vision.options import View
 
     views = tuple(take_network(ctx, param, view) for view in listed(click.STRING)(ctx, param, value))
     for view in views:
-        try:
+        with usage("--views"):
             View.parse(view)
-        except VisionError as error:
-            raise click.BadParameter(str(error), ctx, param) from error
     return views
 
 
