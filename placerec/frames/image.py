@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placerec.errors import SourceError
-from placerec.frames.sequence import ColourImage, Colours, Gray, Image
+from placerec.frames.sequence import ColourImage, Colours, Gray, Image, gray_levels
 
 # cv2 is imported where it is used: listing frames must not cost its import.
 
@@ -45,9 +45,9 @@ _DEPTHS = (8, 10, 12, 14, 16)
 def read_gray(path: Path | str) -> Gray:
     """The grey levels 0..255 of an image file, (h, w): uint8, or float32 for 16 bits a channel.
 
-    Raises SourceError naming the file and the reason: missing, unreadable, a pipe, and what `decode_gray` refuses.
+    Raises SourceError naming the file and the reason: missing, unreadable, a pipe, and what `decode_image` refuses.
     """
-    return decode_gray(_bytes_of(Path(path)), str(path))
+    return gray_levels(read_image(path))
 
 
 def read_image(path: Path | str, *, colours: bool = False) -> Image:
@@ -62,8 +62,8 @@ def read_colours(path: Path | str, height: int) -> Gray:
     """
     import cv2
 
-    data, name = _bytes_of(Path(path)), str(path)
-    data = _checked(data, name)
+    name = str(path)
+    data = _checked(_bytes_of(Path(path)), name)
     flags = cv2.IMREAD_COLOR
     if data.startswith(_JPEG) and (frame := _jpeg_frame(data)):
         least = min(struct.unpack_from(">HH", data, frame + 5))
@@ -86,40 +86,27 @@ def _bytes_of(path: Path) -> bytes:
         raise SourceError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def decode_gray(data: bytes, name: str) -> Gray:
+def decode_image(data: bytes, name: str, *, colours: bool = False) -> Image:
     """The grey levels 0..255 of an encoded image (JPEG, PNG...), (h, w): uint8, or float32 for 16 bits a channel.
 
     OpenCV's grey decoding is the one path (its luma differs by up to 11 levels from a conversion of the decoded
     colours); alpha and colour profiles are ignored, EXIF orientation is applied. 16 bits: the depth in use is the
     least of 8, 10, 12, 14, 16 bits that holds the brightest pixel, and its top becomes 255 (full 16 bits: value / 257).
+    `colours`: a `ColourImage`, for which the colours are decoded apart; those of 16 bits are scaled as grey levels are,
+    by the depth that holds their own greatest value, and rounded; a grey image has three equal channels.
     Raises SourceError that begins with `name`: empty, truncated, damaged, no image, pixels of another type, a side
     below 8 pixels, more than MAX_PIXELS of them (PNG and JPEG).
-    """
-    return _gray_levels(_checked(data, name), name)
-
-
-def decode_image(data: bytes, name: str, *, colours: bool = False) -> Image:
-    """What `decode_gray` gives; with `colours` a `ColourImage`, for which the colours are decoded apart.
-
-    Colours of 16 bits are scaled as grey levels are, by the depth that holds their own greatest value, and rounded;
-    a grey image has three equal channels.
     """
     import cv2
 
     data = _checked(data, name)
-    gray = _gray_levels(data, name)
+    # ANYDEPTH: without it 16 bits are cut to the upper 8, which leaves 12-bit cameras a black picture.
+    gray = as_gray(_decode(name, data, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH), name)
     if not colours:
         return gray
     # Grey levels made of the colours would be others.
     pixels = _decode(name, data, cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
     return ColourImage(gray, as_colours(pixels, name))
-
-
-def _gray_levels(data: bytes, name: str) -> Gray:
-    import cv2
-
-    # ANYDEPTH: without it 16 bits are cut to the upper 8, which leaves 12-bit cameras a black picture.
-    return as_gray(_decode(name, data, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH), name)
 
 
 def _checked(data: bytes, name: str) -> bytes:
