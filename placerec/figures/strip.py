@@ -44,14 +44,15 @@ class Axis:
 def axis_of(beliefs: Sequence[Beliefs]) -> Axis:
     """Time where every frame has one and none goes back, else frames."""
     longest = max((len(one) for one in beliefs), default=0)
-    if not longest or not all(_timed(one.times) for one in beliefs):
+    if not longest or not all(timed(one.times) for one in beliefs):
         return Axis("frame", None, max(longest, 1))
     end = max(float(_edges(one.times)[-1]) for one in beliefs if len(one))
     seconds, name = next((size, name) for size, name, least in reversed(_UNITS) if end >= least * size)
     return Axis(f"time from the first frame, {name}", seconds, end / seconds)
 
 
-def _timed(times: Floats) -> bool:
+def timed(times: Floats) -> bool:
+    """Whether times in seconds (n,) can be an axis: all are known, none goes back, and they are not all one."""
     return bool(np.isfinite(times).all() and (np.diff(times) >= 0).all() and (len(times) < 2 or times[-1] > times[0]))
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from placerec.arrays import Floats
 from placerec.errors import EvaluationError
 from placerec.evaluation.metrics import right_frames
+from placerec.figures.strip import timed
 from placerec.frames.naming import unique_names
 from placerec.frames.table import Labels
 from placerec.hohmm.beliefs import UNKNOWN_PLACE, Beliefs
@@ -98,11 +99,10 @@ def group_files(named: Sequence[tuple[Path, Beliefs]], decisions: Mapping[Path, 
 
 def pack_drive(drive: Drive, places: Sequence[str], systems: Sequence[str]) -> dict[str, Any]:
     """A drive as plain values; `places`: all of the page, by whose numbers places are called, -1 for none."""
-    timed = bool(len(drive.frames)) and np.isfinite(drive.times).all() and (np.diff(drive.times) >= 0).all()
     return {
         "name": drive.name,
         "frames": list(drive.frames),
-        "times": _numbers(drive.times, "<f8") if timed else None,
+        "times": _numbers(drive.times, "<f8") if drive.frames and timed(drive.times) else None,
         "truth": _runs(Labels(drive.truth).codes(places).tolist()),
         "systems": [
             _pack_beliefs(drive.beliefs[name], places) | _pack_reasons(drive, name) if name in drive.beliefs else None

@@ -136,6 +136,13 @@ def test_a_drive_without_labels_has_no_number(tmp_path: Path) -> None:
     assert spread(data_in(page)["drives"][0]["systems"][0]["judged"]) == [-1] * 4
 
 
+def test_frames_are_the_axis_where_times_are_none() -> None:
+    for times in ([7.0] * 4, [1.0, 2.0, 1.5, 3.0], [1.0, np.nan, 2.0, 3.0]):
+        beliefs = beliefs_of("run", PLACES, [""] * 4, ["hall"] * 4, times=np.array(times))
+        (drive,) = group_files([(Path("run.tsv"), beliefs)], {})
+        assert pack_drive(drive, PLACES, [""])["times"] is None
+
+
 def test_unknown_is_a_place_of_its_own() -> None:
     made = beliefs_of("run", PLACES, ["hall", "", "attic"], ["hall", "hall", "unknown"])
     beliefs = replace(made, unknown=np.array([0.1, 0.2, 0.9]))
