@@ -175,6 +175,17 @@ def test_it_fits_a_narrow_screen(page: Any) -> None:
     assert box["width"] >= 380
 
 
+def test_on_a_narrow_screen_the_drive_that_is_gone_to_stands_above_the_moment(page: Any) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    set_size(page, 400, 700)
+    page.execute_script("scrollTo(0, 0)")
+    press(page, Keys.ARROW_DOWN)
+    assert moment(page).startswith("b, frame 0")
+    bottom = page.execute_script("return document.querySelector('.drive.current').getBoundingClientRect().bottom")
+    assert bottom <= page.execute_script("return document.querySelector('.moment').getBoundingClientRect().top")
+
+
 def test_paper_gets_the_still_picture(page: Any) -> None:
     def there(selector: str) -> bool:
         return bool(page.find_element("css selector", selector).is_displayed())
