@@ -21,8 +21,9 @@ from pathlib import Path
 import numpy as np
 
 from placerec.evaluation.bootstrap import compare_pairs, count_blocks, draw, interval
-from placerec.experiments.comparison.benchmark import COMPARED, MethodRun
+from placerec.experiments.comparison.benchmark import MethodRun
 from placerec.experiments.comparison.figure import plot_comparison
+from placerec.experiments.comparison.methods import COMPARED
 from placerec.experiments.comparison.results import (
     Comparison,
     MethodScore,

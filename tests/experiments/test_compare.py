@@ -15,8 +15,9 @@ from helpers.small_world import write_images
 
 from placerec.errors import EvaluationError, MissingExtraError, OutputError, PlacerecError
 from placerec.experiments import store
-from placerec.experiments.comparison import benchmark
-from placerec.experiments.comparison.benchmark import COMPARED, Benchmark, ComparedMethod, MethodRun
+from placerec.experiments.comparison import benchmark, methods
+from placerec.experiments.comparison.benchmark import Benchmark, MethodRun
+from placerec.experiments.comparison.methods import COMPARED, ComparedMethod
 from placerec.experiments.comparison.results import Comparison, format_comparison
 from placerec.experiments.comparison.run import compare
 from placerec.figures.evaluation import evaluate_files
@@ -123,7 +124,7 @@ def test_a_second_run_does_nothing_again(
 
     monkeypatch.setattr(store, "describe", refuse)
     monkeypatch.setattr(Dictionary, "fit", refuse)
-    monkeypatch.setattr(benchmark, "_timed", refuse)
+    monkeypatch.setattr(methods, "timed", refuse)
     monkeypatch.setattr(benchmark, "train_model", refuse)
     run(runs, out)
     for name in ("methods.csv", "pairs.csv", "methods.png"):

@@ -10,7 +10,7 @@ import numpy as np
 from placerec.arrays import Floats
 from placerec.evaluation.bootstrap import LEAST
 from placerec.evaluation.summary import percent, shorten
-from placerec.experiments.comparison.benchmark import COMPARED, WORDS
+from placerec.experiments.comparison.methods import COMPARED, WORDS
 from placerec.experiments.comparison.results import Comparison, MethodScore
 from placerec.figures.canvas import MARGIN, figure_file, panel, place_colours, write_line
 

@@ -17,16 +17,9 @@ from pathlib import Path
 
 from placerec.errors import EvaluationError, SourceError, check_optional
 from placerec.evaluation.bootstrap import LEAST
-from placerec.experiments.comparison.benchmark import (
-    COMPARED,
-    SEVERAL_WORDS,
-    TWO_WORDS,
-    Benchmark,
-    MethodRun,
-    encode,
-    train_models,
-)
+from placerec.experiments.comparison.benchmark import Benchmark, MethodRun, encode, train_models
 from placerec.experiments.comparison.figure import plot_comparison
+from placerec.experiments.comparison.methods import COMPARED, SEVERAL_WORDS, TWO_WORDS
 from placerec.experiments.comparison.page import comparison_page
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
 from placerec.experiments.cost import front_end_cost
