@@ -2,17 +2,13 @@
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from itertools import groupby, islice
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from placerec.arrays import Ints, Mask, Singles
 from placerec.errors import SourceError, VisionError, counted
@@ -20,7 +16,8 @@ from placerec.evaluation.summary import percent
 from placerec.figures.canvas import figure_file, picture_file
 from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at
 from placerec.frames.image import read_image
-from placerec.frames.sequence import ColourImage, Image
+from placerec.frames.sequence import Image
+from placerec.inspection.changes import CHANGES, changed
 from placerec.jobs import Executor, Progress, workers
 from placerec.vision import Dictionary, DictionarySet
 from placerec.vision.spec import DescriptorSpec, check_describable, descriptor
@@ -36,21 +33,6 @@ _NONE = -1
 # Okabe and Ito's vermilion and sky blue.
 _FAR, _NEAR = "#D55E00", "#56B4E9"
 _NEXT = "the next frame, for comparison"
-
-
-Pixels = NDArray[Any]
-
-
-@dataclass(frozen=True)
-class Change:
-    """One way to spoil a picture: `apply(pixels, spec, rng)` gives pixels of the same or of the fitted size.
-
-    Pixels are grey (h, w), or blue, green, red (h, w, 3).
-    """
-
-    kind: str
-    amount: str
-    apply: Callable[[Pixels, DescriptorSpec, np.random.Generator], Pixels]
 
 
 @dataclass(frozen=True)
@@ -282,80 +264,12 @@ def _described(
         return image
     try:
         read = read_image(frame.path, colours=spec.colours) if image is None else image
-        changes = () if rng is None else (descriptor(_changed(each, read, spec, rng), spec) for each in CHANGES)
+        changes = () if rng is None else (descriptor(changed(each, read, spec, rng), spec) for each in CHANGES)
         return np.stack([descriptor(read, spec), *changes])
     except SourceError as error:
         return str(error)
     except VisionError as error:
         return f"{frame.path}: frame {frame.name}: {error}"
-
-
-def _changed(change: Change, image: Image, spec: DescriptorSpec, rng: np.random.Generator) -> Image:
-    if isinstance(image, ColourImage):
-        return ColourImage(change.apply(image.gray, spec, rng), change.apply(image.colours, spec, rng))
-    return change.apply(image, spec, rng)
-
-
-def _like(values: Pixels, pixels: Pixels) -> Pixels:
-    """Values cut to 0..255, and to whole numbers where the picture's are."""
-    values = values.clip(0, 255)
-    return np.rint(values).astype(np.uint8) if pixels.dtype == np.uint8 else values.astype(np.float32)
-
-
-def _jpeg(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, quality: int) -> Pixels:
-    whole = np.rint(pixels).astype(np.uint8)
-    _, data = cv2.imencode(".jpg", whole, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    return np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE if pixels.ndim == 2 else cv2.IMREAD_COLOR))
-
-
-def _noise(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, sigma: float) -> Pixels:
-    return _like(pixels + sigma * rng.standard_normal(pixels.shape), pixels)
-
-
-def _brightness(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, factor: float) -> Pixels:
-    return _like(pixels * np.float64(factor), pixels)
-
-
-def _blur(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, sigma: float) -> Pixels:
-    return np.asarray(cv2.GaussianBlur(pixels, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE))
-
-
-def _shift(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, right: int, down: int) -> Pixels:
-    # What comes in from outside repeats the edge.
-    height, width = pixels.shape[:2]
-    rows = np.clip(np.arange(height) - down, 0, height - 1)
-    columns = np.clip(np.arange(width) - right, 0, width - 1)
-    return pixels[np.ix_(rows, columns)]
-
-
-def _resized(pixels: Pixels, spec: DescriptorSpec, rng: np.random.Generator, *, interpolation: int) -> Pixels:
-    """Grey levels fitted to their square as `fit_image` does it, but by another filter."""
-    if pixels.ndim == 3:
-        return pixels
-    height, width = pixels.shape
-    side = spec.image_size
-    if spec.fit == "squash":
-        height, width = side, side
-    else:
-        scale = max(side / height, side / width)
-        height, width = int(scale * height + 0.5), int(scale * width + 0.5)
-    top, left = (height - side) // 2, (width - side) // 2
-    whole = cv2.resize(pixels, (width, height), interpolation=interpolation)
-    return _like(whole[top : top + side, left : left + side], pixels)
-
-
-CHANGES = (
-    *(Change("JPEG", f"quality {q}", partial(_jpeg, quality=q)) for q in (90, 70, 50, 30)),
-    *(Change("noise", f"sigma {s}", partial(_noise, sigma=s)) for s in (2, 5, 10)),
-    *(Change("brightness", f"{p:+d} %", partial(_brightness, factor=1 + p / 100)) for p in (-30, -10, 10, 30)),
-    *(Change("blur", f"sigma {s}", partial(_blur, sigma=s)) for s in (1, 2)),
-    *(
-        Change("shift by 1 pixel", way, partial(_shift, right=right, down=down))
-        for way, right, down in (("left", -1, 0), ("right", 1, 0), ("up", 0, -1), ("down", 0, 1))
-    ),
-    Change("resize filter", "nearest", partial(_resized, interpolation=cv2.INTER_NEAREST)),
-    Change("resize filter", "bicubic", partial(_resized, interpolation=cv2.INTER_CUBIC)),
-)
 
 
 def format_stability(found: Stability) -> str:

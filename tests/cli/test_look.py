@@ -9,7 +9,7 @@ from helpers.small_world import write_images
 from helpers.typed_commands import fails, placerec
 
 from placerec.frames import read_gray
-from placerec.inspection.word_stability import CHANGES
+from placerec.inspection.changes import CHANGES
 from placerec.vision import DescriptorSpec, DictionaryOptions, DictionarySet, DictionarySetOptions, train_dictionary
 
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from placerec.errors import VisionError
 from placerec.frames import Sequence, find_sequences, read_gray
 from placerec.frames.sequence import Gray
-from placerec.inspection import word_stability
-from placerec.inspection.word_stability import CHANGES, Change, ChangeResult, Stability, word_changes
+from placerec.inspection import changes, word_stability
+from placerec.inspection.changes import CHANGES, Change
+from placerec.inspection.word_stability import ChangeResult, Stability, word_changes
 from placerec.jobs import workers
 from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, descriptor, fit_image
 
@@ -207,7 +208,7 @@ def test_another_filter_keeps_the_way_of_fitting(fit: str) -> None:
     gray = picture(np.float32, 60, 90)
     spec = DescriptorSpec(image_size=20, fit=fit)
     rng = np.random.Generator(np.random.PCG64(0))
-    with_ours = word_stability._resized(gray, spec, rng, interpolation=cv2.INTER_AREA)
+    with_ours = changes._resized(gray, spec, rng, interpolation=cv2.INTER_AREA)
     np.testing.assert_allclose(with_ours, fit_image(gray, 20, fit), atol=1e-3)
     for name in ("nearest", "bicubic"):
         assert not np.array_equal(spoilt(gray, "resize filter", name, spec), with_ours)
