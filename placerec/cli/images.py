@@ -154,7 +154,8 @@ def show_frame(
     default=500,
     help="Frames to look at, drawn by the seed; all if there are fewer.",
 )
-@shared.seed_option("Seed of the sample and of the noise.")
+@click.option("--light", is_flag=True, help="Look at the frames in the simulated lights of relight instead.")
+@shared.seed_option("Seed of the sample, of the noise and of the light.")
 @shared.output_option("stability.png", "Draw the table as bars: .png, .svg or .pdf.", required=False)
 @shared.json_option()
 @shared.work_options
@@ -163,8 +164,9 @@ def stability(sources: tuple[Path, ...], words: Path, out: Path | None, as_json:
     """Measure how stable the words are.
 
     SOURCE is what tokenize takes. Frames are spoilt by JPEG compression, noise, brightness, blur, a shift of one pixel
-    and another resize filter; told is the share of frames that get another word, with its interval, and how many of
-    these words are next to the right one on the map.
+    and another resize filter, or looked at as they might be in other lights (simulated, as relight does it); told is
+    the share of frames that get another word, with its interval, and how many of these words are next to the right one
+    on the map.
     """
     from placerec.inspection.word_stability import format_stability, stability as run
 

@@ -1,6 +1,6 @@
-"""What a camera does to a picture: its small faults, for `placerec stability` to add them."""
+"""What `placerec stability` does to a picture: a camera's small faults, and simulated changes of light."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -9,10 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from placerec.frames.image import decode_image
 from placerec.frames.sequence import ColourImage, Image
+from placerec.vision.light import LIGHTS, relit_jpeg
 from placerec.vision.spec import DescriptorSpec
 
 Pixels = NDArray[Any]
+SIMULATED = "simulated light"
 
 
 @dataclass(frozen=True)
@@ -27,11 +30,23 @@ class Change:
     apply: Callable[[Pixels, DescriptorSpec, np.random.Generator], Pixels]
 
 
-def changed(change: Change, image: Image, spec: DescriptorSpec, rng: np.random.Generator) -> Image:
-    """An image after a change: its grey levels and, where it has them, its colours."""
-    if isinstance(image, ColourImage):
-        return ColourImage(change.apply(image.gray, spec, rng), change.apply(image.colours, spec, rng))
-    return change.apply(image, spec, rng)
+def with_faults(image: Image, spec: DescriptorSpec, rng: np.random.Generator) -> Iterator[Image]:
+    """An image after each of CHANGES: its grey levels and, where it has them, its colours."""
+    for change in CHANGES:
+        if isinstance(image, ColourImage):
+            yield ColourImage(change.apply(image.gray, spec, rng), change.apply(image.colours, spec, rng))
+        else:
+            yield change.apply(image, spec, rng)
+
+
+def in_lights(image: Image, spec: DescriptorSpec, *, seed: int, sequence: str, frame: int) -> Iterator[Image]:
+    """An image, in colours, in each of LIGHTS: what is read of the file that `placerec relight` writes of it.
+
+    `seed`, `sequence` and `frame` decide what is drawn, see `placerec.vision.light.relit`.
+    """
+    for light in LIGHTS:
+        stored = relit_jpeg(image, light, seed=seed, sequence=sequence, frame=frame)
+        yield decode_image(stored, f"{sequence}: frame {frame} in the light {light}", colours=spec.colours)
 
 
 def _like(values: Pixels, pixels: Pixels) -> Pixels:

@@ -1,10 +1,10 @@
-"""How stable words are: the share of frames that get another word when a camera's small faults are added to them."""
+"""How stable words are: the share of frames that get another word by a camera's small faults, or in another light."""
 
 import logging
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import groupby, islice
+from itertools import chain, groupby, islice
 from pathlib import Path
 from statistics import NormalDist
 
@@ -17,10 +17,11 @@ from placerec.figures.canvas import figure_file, picture_file
 from placerec.frames import Frame, Sequence, SourceOptions, find_sequences, images_at
 from placerec.frames.image import read_image
 from placerec.frames.sequence import Image
-from placerec.inspection.changes import CHANGES, changed
+from placerec.inspection.changes import CHANGES, SIMULATED, in_lights, with_faults
 from placerec.jobs import Executor, Progress, workers
 from placerec.vision import Dictionary, DictionarySet
-from placerec.vision.spec import DescriptorSpec, check_describable, descriptor
+from placerec.vision.light import LIGHTS
+from placerec.vision.spec import check_describable, descriptor
 
 log = logging.getLogger(__name__)
 
@@ -33,6 +34,10 @@ _NONE = -1
 # Okabe and Ito's vermilion and sky blue.
 _FAR, _NEAR = "#D55E00", "#56B4E9"
 _NEXT = "the next frame, for comparison"
+# The kind and the amount of each change.
+_Names = list[tuple[str, str]]
+_FAULTS: _Names = [(one.kind, one.amount) for one in CHANGES]
+_LIGHTS: _Names = [(SIMULATED, light) for light in LIGHTS]
 
 
 @dataclass(frozen=True)
@@ -106,6 +111,7 @@ def stability(
     name: str = "",
     network: Path | str | None = None,
     source_options: SourceOptions = SourceOptions(),
+    light: bool = False,
     seed: int = 0,
     sample: int = SAMPLE,
     work: Executor | None = None,
@@ -114,14 +120,14 @@ def stability(
     """`placerec stability`: how many frames of the sources get another word by what a camera does to pictures.
 
     `out`: the picture to draw, PNG, SVG or PDF by suffix. `name`: which dictionary of several, "" for the first.
-    `network`: the file of the image network, for words of one. `seed`, `sample`, `work`: see `word_changes`. Raises
-    SourceError and VisionError for what cannot be read, OutputError for a picture that cannot be written,
-    MissingExtraError without matplotlib.
+    `network`: the file of the image network, for words of one. `light`: in the simulated lights of `placerec relight`
+    instead. `seed`, `sample`, `work`: see `word_changes`. Raises SourceError and VisionError for what cannot be read,
+    OutputError for a picture that cannot be written, MissingExtraError without matplotlib.
     """
     with picture_file(out) as picture:
         dictionary = DictionarySet.load(words, network=network).named(name)
         sequences = find_sequences(sources, options=source_options)
-        found = word_changes(sequences, dictionary, seed=seed, sample=sample, work=work, progress=progress)
+        found = word_changes(sequences, dictionary, light=light, seed=seed, sample=sample, work=work, progress=progress)
         if picture is not None:
             plot_stability(found, picture)
     return found
@@ -131,16 +137,20 @@ def word_changes(
     sequences: Iterable[Sequence],
     dictionary: Dictionary,
     *,
+    light: bool = False,
     seed: int = 0,
     sample: int = SAMPLE,
     work: Executor | None = None,
     progress: Progress | None = None,
 ) -> Stability:
-    """The words of `sample` frames, drawn by `seed`, as they are and after each of CHANGES, compared; of all if fewer.
+    """The words of `sample` frames, drawn by `seed`, as they are and changed, compared; of all if fewer.
 
-    The picture is changed as the file holds it, before it is fitted, and stays of 8 bits where it was: in grey, and for
-    descriptors of colours in these, too, but for the resize filter, which is that of grey levels.
-    Noise is drawn by seed and number of the frame. `work`: who does the work (`jobs.workers`), None for threads; the
+    The changes are CHANGES. The picture is changed as the file holds it, before it is fitted, and stays of 8 bits where
+    it was: in grey, and for descriptors of colours in these, too, but for the resize filter, which is that of grey
+    levels. Noise is drawn by seed and number of the frame. With `light` the changes are `placerec.vision.light.LIGHTS`,
+    and the words those of the sequences that `placerec relight` writes with this seed.
+
+    `work`: who does the work (`jobs.workers`), None for threads; the
     result does not depend on it. `progress` is called with pictures done and in all. An image that cannot be read is
     skipped and named in a warning; VisionError if none can be read, or if the dictionary is of descriptors that were
     computed elsewhere.
@@ -152,9 +162,9 @@ def word_changes(
     drawn = np.sort(np.random.Generator(np.random.PCG64(seed)).permutation(total)[:sample])
     # With the frame after each, of the same sequence.
     wanted = np.union1d(drawn, np.setdiff1d(drawn + 1, starts))
-    parts = _parts(sequences, starts, wanted, np.isin(wanted, drawn), dictionary.spec.colours)
+    parts = _parts(sequences, starts, wanted, np.isin(wanted, drawn), dictionary.spec.colours or light)
     words = []
-    for found, complaints in (work or workers())(_Look(dictionary, seed), parts):
+    for found, complaints in (work or workers())(_Look(dictionary, seed, light), parts):
         for complaint in complaints:
             log.warning("%s; the frame is skipped", complaint)
         words.append(found)
@@ -163,16 +173,19 @@ def word_changes(
     judged = _Judged(np.concatenate(words), wanted, drawn, starts)
     if not len(judged.rows):
         raise VisionError(f"none of the {counted(total, 'image')} can be read; name a folder with images")
-    return judged.result(dictionary.training.size)
+    return judged.result(dictionary.training.size, _LIGHTS if light else _FAULTS)
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
     """Some frames of one sequence, by their `numbers` int64 (m,) among all, and which are to be `changed`, bool (m,).
 
-    `images`: their grey levels or why there are none; None if each is still in a file of its own.
+    `start`: the number of the sequence's first frame. `images`: the frames' images, or why there are none; None if each
+    is still in a file of its own.
     """
 
+    sequence: str
+    start: int
     numbers: Ints
     changed: Mask
     frames: tuple[Frame, ...]
@@ -189,7 +202,7 @@ def _parts(sequences: list[Sequence], starts: Ints, wanted: Ints, changed: Mask,
             some = slice(first, min(first + _TOGETHER, own.stop))
             frames = tuple(sequence.frames[number - start] for number in wanted[some].tolist())
             taken = None if sequence.recording is None else tuple(islice(images, len(frames)))
-            yield _Part(wanted[some], changed[some], frames, taken)
+            yield _Part(sequence.name, start, wanted[some], changed[some], frames, taken)
 
 
 @dataclass(frozen=True)
@@ -198,23 +211,43 @@ class _Look:
 
     dictionary: Dictionary
     seed: int
+    light: bool
 
     def __call__(self, part: _Part) -> tuple[Ints, list[str]]:
         """The words int64 (m, 1 + changes), _NONE where there are none, and complaints of frames that cannot be read.
 
         A function of the part alone.
         """
-        words = np.full((len(part.numbers), 1 + len(CHANGES)), _NONE)
+        words = np.full((len(part.numbers), 1 + len(_LIGHTS if self.light else _FAULTS)), _NONE)
         complaints = []
-        for k, (frame, number) in enumerate(zip(part.frames, part.numbers.tolist(), strict=True)):
-            rng = np.random.Generator(np.random.PCG64([self.seed, number]))
-            image = None if part.images is None else part.images[k]
-            found = _described(frame, image, self.dictionary.spec, rng if part.changed[k] else None)
+        for k in range(len(part.numbers)):
+            found = self._described(part, k)
             if isinstance(found, str):
                 complaints.append(found)
             else:
                 words[k, : len(found)] = self.dictionary.words(found)[0]
         return words, complaints
+
+    def _described(self, part: _Part, k: int) -> Singles | str:
+        """Descriptors of a frame as it is and, if that is wanted, changed, (1 + changes, d); why there are none."""
+        frame, spec = part.frames[k], self.dictionary.spec
+        image = None if part.images is None else part.images[k]
+        if isinstance(image, str):
+            return image
+        try:
+            read = read_image(frame.path, colours=spec.colours or self.light) if image is None else image
+            changes = self._changed(read, part, k) if part.changed[k] else ()
+            return np.stack([descriptor(each, spec) for each in chain((read,), changes)])
+        except SourceError as error:
+            return str(error)
+        except VisionError as error:
+            return f"{frame.path}: frame {frame.name}: {error}"
+
+    def _changed(self, image: Image, part: _Part, k: int) -> Iterator[Image]:
+        spec, number = self.dictionary.spec, int(part.numbers[k])
+        if self.light:
+            return in_lights(image, spec, seed=self.seed, sequence=part.sequence, frame=number - part.start)
+        return with_faults(image, spec, np.random.Generator(np.random.PCG64([self.seed, number])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,8 +268,8 @@ class _Judged:
         found: Ints = rows[self.words[rows, 0] != _NONE]
         return found
 
-    def result(self, size: int) -> Stability:
-        """What came of it, on a map of size x size."""
+    def result(self, size: int, names: _Names) -> Stability:
+        """What came of the changes that are called `names`, on a map of size x size."""
         rows, words = self.rows, self.words
         # With a frame after them, of the same sequence, that could be read, too.
         before = rows[np.isin(self.wanted[rows] + 1, self.wanted[self._readable(np.arange(len(words)))])]
@@ -244,8 +277,8 @@ class _Judged:
         total, steps = int(self.starts[-1]), int(self.starts[-1]) - len(np.unique(self.starts)) + 1
         if len(self.drawn) == total:
             total, steps = len(rows), len(before)
-        changed = zip(CHANGES, words[rows, 1:].T, strict=True)
-        results = tuple(_compared(one.kind, one.amount, words[rows, 0], after, total, size) for one, after in changed)
+        changed = zip(names, words[rows, 1:].T, strict=True)
+        results = tuple(_compared(*name, words[rows, 0], after, total, size) for name, after in changed)
         step = _compared(_NEXT, "", words[before, 0], words[before + 1, 0], steps, size)
         return Stability(len(rows), total, results, step)
 
@@ -254,22 +287,6 @@ def _compared(kind: str, amount: str, first: Ints, after: Ints, of: int, size: i
     # Next to each other on the map, corners included.
     apart = np.maximum(np.abs(first // size - after // size), np.abs(first % size - after % size))
     return ChangeResult(kind, amount, len(first), int((apart > 0).sum()), int((apart == 1).sum()), of)
-
-
-def _described(
-    frame: Frame, image: Image | str | None, spec: DescriptorSpec, rng: np.random.Generator | None
-) -> Singles | str:
-    """Descriptors of a frame as it is and, with `rng`, after each change, (1 + changes, d); why there are none."""
-    if isinstance(image, str):
-        return image
-    try:
-        read = read_image(frame.path, colours=spec.colours) if image is None else image
-        changes = () if rng is None else (descriptor(changed(each, read, spec, rng), spec) for each in CHANGES)
-        return np.stack([descriptor(read, spec), *changes])
-    except SourceError as error:
-        return str(error)
-    except VisionError as error:
-        return f"{frame.path}: frame {frame.name}: {error}"
 
 
 def format_stability(found: Stability) -> str:

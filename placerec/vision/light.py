@@ -26,7 +26,7 @@ from placerec.errors import VisionError
 from placerec.files import whole_folder
 from placerec.frames import Sequence, SourceOptions, all_images, find_sequences
 from placerec.frames.layouts import COLD_LIST, COLD_LIST_FOLDER
-from placerec.frames.sequence import ColourImage, Colours, Frame
+from placerec.frames.sequence import ColourImage, Colours, Frame, Image
 from placerec.jobs import Progress
 
 log = logging.getLogger(__name__)
@@ -94,12 +94,9 @@ def _write_sequence(sequence: Sequence, folder: Path, light: str, seed: int) -> 
             log.warning("%s; the frame is left out", image)
             yield False
             continue
-        pixels = image.colours if isinstance(image, ColourImage) else image
-        levels = np.rint(pixels.clip(0, 255)).astype(np.uint8)
         name = _name(frame, number)
-        found = relit(levels, light, seed=seed, sequence=sequence.name, frame=number)
-        _, stored = cv2.imencode(".jpg", found, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-        (folder / CAMERA / name).write_bytes(stored.tobytes())
+        stored = relit_jpeg(image, light, seed=seed, sequence=sequence.name, frame=number)
+        (folder / CAMERA / name).write_bytes(stored)
         if frame.place:
             labels.append(f"{name} {frame.place}\n")
         yield True
@@ -111,6 +108,18 @@ def _name(frame: Frame, number: int) -> str:
     if frame.path.name == frame.name:
         return f"{Path(frame.name).stem}.jpeg"
     return f"frame_{number:06d}.jpeg" if math.isnan(frame.time) else f"t{frame.time:.6f}.jpeg"
+
+
+def relit_jpeg(image: Image, light: str, *, seed: int, sequence: str, frame: int) -> bytes:
+    """An image of 0..255 in another light, as `relight` stores it: a JPEG of quality 90, in colours.
+
+    Arguments otherwise, and what is raised: see `relit`.
+    """
+    pixels = image.colours if isinstance(image, ColourImage) else image
+    levels = np.rint(pixels.clip(0, 255)).astype(np.uint8)
+    found = relit(levels, light, seed=seed, sequence=sequence, frame=frame)
+    _, stored = cv2.imencode(".jpg", found, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    return stored.tobytes()
 
 
 def relit(image: Colours, light: str, *, seed: int, sequence: str, frame: int) -> Colours:

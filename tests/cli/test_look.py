@@ -11,6 +11,7 @@ from helpers.typed_commands import fails, placerec
 from placerec.frames import read_gray
 from placerec.inspection.changes import CHANGES
 from placerec.vision import DescriptorSpec, DictionaryOptions, DictionarySet, DictionarySetOptions, train_dictionary
+from placerec.vision.light import LIGHTS
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +106,16 @@ def test_stability(world: Path, tmp_path: Path) -> None:
     assert found["frames"] == 12
     assert [change["kind"] for change in found["changes"]] == [change.kind for change in CHANGES]
     assert placerec(*args).stdout == told.stdout
+
+
+def test_stability_in_other_lights_says_that_they_are_simulated(world: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    args = ("stability", world / "runs/seq2", "-w", world / "words.npz", "--light", "--seed", "1")
+    told = placerec(*args, "-o", tmp_path / "bars.svg")
+    assert [line[:32].strip() for line in told.stdout.splitlines()[2:6]] == [f"simulated light {one}" for one in LIGHTS]
+    assert {f"simulated light {one}" for one in LIGHTS} <= set(drawn_texts(tmp_path / "bars.svg"))
+    found = json.loads(placerec(*args, "--json").stdout)
+    assert [(one["kind"], one["amount"]) for one in found["changes"]] == [("simulated light", one) for one in LIGHTS]
 
 
 @pytest.mark.parametrize("command", ["show-words", "show-frame", "stability"])

@@ -18,6 +18,7 @@ from placerec.inspection.changes import CHANGES, Change
 from placerec.inspection.word_stability import ChangeResult, Stability, word_changes
 from placerec.jobs import workers
 from placerec.vision import DescriptorSpec, Dictionary, DictionaryOptions, describe, descriptor, fit_image
+from placerec.vision.light import LIGHTS, relight
 
 SPEC = DescriptorSpec(image_size=16)
 World = tuple[list[Sequence], Dictionary]
@@ -144,6 +145,39 @@ def test_an_image_that_cannot_be_read_is_skipped_and_named(
         path.write_text("no picture")
     with pytest.raises(VisionError, match="none of the 4 images can be read"):
         word_changes(find_sequences([tmp_path / "seq"]), world[1])
+
+
+def coloured(root: Path, video: bool) -> None:
+    """Two sequences of frames in colours, which differ little from each other."""
+    rng = np.random.default_rng(0)
+    base = cv2.GaussianBlur(rng.random((48, 64, 3)), (0, 0), 3) - 0.5
+    for name in ("seq1", "seq2"):
+        (root / name).mkdir(parents=True)
+        frames = [
+            np.clip(120 + 600 * base + 6 * rng.standard_normal(base.shape), 0, 255).astype(np.uint8) for _ in range(7)
+        ]
+        if video:
+            write_video(root / name / "run.avi", "MJPG", frames)
+        for number, frame in enumerate([] if video else frames):
+            cv2.imwrite(str(root / name / f"{number:03d}.png"), frame)
+
+
+@pytest.mark.parametrize(("kind", "video"), [("gist", False), ("colour", False), ("ranks", True)])
+def test_words_in_other_lights_are_those_of_the_relit_sequences(tmp_path: Path, kind: str, video: bool) -> None:
+    coloured(tmp_path / "runs", video)
+    sequences = find_sequences([tmp_path / "runs"])
+    spec = DescriptorSpec(kind=kind)
+    values = describe(sequences, spec).values
+    dictionary = Dictionary.fit(values, spec=spec, options=DictionaryOptions(size=3))
+    found = word_changes(sequences, dictionary, light=True, seed=2)
+    before = dictionary.words(values)[0]
+    for light, result in zip(LIGHTS, found.results, strict=True):
+        relight([tmp_path / "runs"], tmp_path / light, light, seed=2)
+        after = dictionary.words(describe(find_sequences([tmp_path / light]), spec).values)[0]
+        assert (result.kind, result.amount, result.frames) == ("simulated light", light, 14)
+        assert result.changed == (before != after).sum()
+    assert sum(result.changed for result in found.results) > 0
+    assert found.step == word_changes(sequences, dictionary).step
 
 
 def test_json_has_shares() -> None:
