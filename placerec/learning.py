@@ -77,10 +77,13 @@ def format_learned(learned: Learned) -> str:
     """What was chosen and why, in five lines at most."""
     made, evidence = learned.dictionaries, learned.evidence
     quality = made.dictionaries[0].quality
-    sizes = ", ".join(f"{len(one.hits)} ({one.name or 'the first'})" for one in made.dictionaries)
+    sizes = ", ".join(f"{size} x {size}" for size in made.options.sizes)
+    worth = evidence.weights.views
+    views = ", ".join(f"{view} ({worth[view].without:.3f})" if view in worth else view for view in made.options.views)
+    without = "; in brackets the log loss without a view" if worth else ""
     learned_from = f"{counted(quality.used, 'frame')} of {counted(len(made.sequences), 'sequence')}"
     lines = [
-        f"words     {sizes}: learned from {learned_from}",
+        f"words     of {views}, {sizes} each: learned from {learned_from}{without}",
         f"places    {len(evidence.frames)}: " + ", ".join(f"{place} {n}" for place, n in evidence.frames.items()),
         f"weights   {evidence}",
     ]

@@ -29,7 +29,8 @@ def learn(sources: tuple[Path, ...], out: Path, **how: Any) -> None:
 
     What train-words, tokenize and train-lm would write, every frame described once; SOURCE is what they take. How much
     words weigh (alpha) and how fast the filter forgets (memory) is judged on each group of sequences by what the others
-    alone teach. `placerec decode IMAGES -m MODEL/` then needs no -w.
+    alone teach; a view that every group is better without is left out. `placerec decode IMAGES -m MODEL/` then needs no
+    -w.
     """
     from placerec.learning import format_learned, learn as run
 

@@ -32,7 +32,7 @@ def learn_several(job: WordsJob, seed: int, given: DictionarySet | None = None) 
     training, options = [one.load() for one in job.train], DictionarySetOptions(seed=seed)
     labels = [(one.sequence.name, [*found.table.places]) for one, found in zip(job.train, training, strict=True)]
     words = repr(options) if given is None else given.fingerprint
-    path = job.cache / "models" / key_of("learned", [one.key for one in job.train], labels, words)
+    path = job.cache / "models" / key_of("learned, views chosen", [one.key for one in job.train], labels, words)
     if not path.exists():
         values = np.concatenate([found.values for found in training])
         table = FrameTable.concat(found.table for found in training)

@@ -6,8 +6,9 @@ belief each frame replaces by the places' shares of the training frames: how fas
 least mean -log b(true place) over the labelled frames of sequences whose words trained nothing of what judges them.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,6 +21,20 @@ ALPHAS = (1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.09, 0.06, 0.04, 0.03, 0.
 MEMORIES = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0)
 # No belief is smaller for the log loss, as in `placerec.evaluation`: one frame must not decide alone.
 _SMALLEST_BELIEF = 1e-15
+# Of two groups, both are easily better without a view by chance.
+LEAST_GROUPS = 3
+
+
+@dataclass(frozen=True)
+class ViewWorth:
+    """What the words of a view are worth: the log loss that is left without them, in nats per frame.
+
+    `better`: how many of `groups` of held-out sequences have less log loss without the view's words.
+    """
+
+    without: float
+    better: int
+    groups: int
 
 
 @dataclass(frozen=True)
@@ -27,7 +42,7 @@ class Weights:
     """The exponent `alpha` of words' probabilities and the filter's `memory`.
 
     `log_loss`: nats per frame that they leave on `frames` held-out ones, and `unweighted` what alpha 1 and memory 0
-    leave; None where there was nothing to choose by.
+    leave; None where there was nothing to choose by. `views`: what the words of each view are worth, if that was asked.
     """
 
     alpha: float
@@ -35,6 +50,21 @@ class Weights:
     log_loss: float | None = None
     unweighted: float | None = None
     frames: int = 0
+    views: Mapping[str, ViewWorth] = field(default_factory=dict)
+
+    @property
+    def superfluous(self) -> str | None:
+        """The view without which least log loss is left, if every group of LEAST_GROUPS or more has less without it.
+
+        A view that is worth little where it is judged may be worth much in another building: least log loss alone
+        leaves out too much (docs/vision.md).
+        """
+        bad = [
+            (one.without, name)
+            for name, one in self.views.items()
+            if LEAST_GROUPS <= one.groups == one.better and self.log_loss is not None and one.without < self.log_loss
+        ]
+        return min(bad)[1] if bad else None
 
 
 @dataclass(frozen=True)
@@ -43,13 +73,21 @@ class HeldOut:
 
     `evidence`: of all of its frames, with `alpha` 1. `truth` int64 (n,): the place of each frame, -1 for one that is
     not judged. `steps` int64 (C, C): how often, in the others, a frame of a place is followed by one of another.
-    `shares` float64 (C,): the places' shares of their frames.
+    `shares` float64 (C,): the places' shares of their frames. `group`: the number of the sequences that were held out
+    together with it. `views`: that of each dictionary, where it is to be told what they are worth.
     """
 
     evidence: Evidence = field(repr=False)
     truth: Ints = field(repr=False)
     steps: Ints = field(repr=False)
     shares: Floats = field(repr=False)
+    group: int = 0
+    views: tuple[str, ...] = ()
+
+    def without(self, view: str) -> "HeldOut":
+        """The sequence without the words of a view, one of several."""
+        others = [number for number, own in enumerate(self.views) if own != view]
+        return replace(self, evidence=replace(self.evidence, own=self.evidence.own[others]))
 
 
 def shares_of(frames: Ints) -> Floats:
@@ -61,20 +99,44 @@ def shares_of(frames: Ints) -> Floats:
 def choose_weights(sequences: Iterable[HeldOut], dictionaries: int) -> Weights:
     """The best of ALPHAS x MEMORIES on the frames of held-out sequences with words of several `dictionaries`.
 
-    Of equally good ones the first. Without a frame to judge: alpha 1 / `dictionaries`, memory 0.
+    Of equally good ones the first. Without a frame to judge: alpha 1 / `dictionaries`, memory 0. Each of several views
+    that all sequences have words of is left out in turn, for `Weights.views`.
     """
-    total: Floats = np.zeros((len(MEMORIES), len(ALPHAS)))
-    frames = 0
-    for sequence in sequences:
-        total += losses(sequence)
-        frames += int((sequence.truth >= 0).sum())
-    if not frames:
+    frames, sums = _losses_of_groups(sequences)
+    judged = sum(frames.values())
+    if not judged:
         return Weights(1 / dictionaries, 0.0)
+    of_all = sums.pop("")
+    total: Floats = np.sum([*of_all.values()], axis=0)
     memory, alpha = np.unravel_index(int(total.argmin()), total.shape)
     unweighted = total[MEMORIES.index(0.0), ALPHAS.index(1.0)]
-    # Six digits: a file to read, and the last bits of a sum differ from machine to machine.
-    told = [max(0.0, float(f"{loss / frames:.6g}")) for loss in (total.min(), unweighted)]
-    return Weights(ALPHAS[alpha], MEMORIES[memory], told[0], told[1], frames)
+    worth = {}
+    for view, without in sums.items():
+        better = sum(bool(without[group].min() < of_all[group].min()) for group in +frames)
+        worth[view] = ViewWorth(_told(np.sum([*without.values()], axis=0).min(), judged), better, len(+frames))
+    return Weights(
+        ALPHAS[alpha], MEMORIES[memory], _told(total.min(), judged), _told(unweighted, judged), judged, worth
+    )
+
+
+def _losses_of_groups(sequences: Iterable[HeldOut]) -> tuple[Counter[int], dict[str, dict[int, Floats]]]:
+    """How many frames of each group are judged, and their `losses` without the words of each view, "" for none."""
+    frames = Counter[int]()
+    sums: dict[str, dict[int, Floats]] = {}
+    for sequence in sequences:
+        views = dict.fromkeys(sequence.views)
+        parts = {"": sequence} | ({view: sequence.without(view) for view in views} if len(views) > 1 else {})
+        # What one sequence lacks cannot be told of all frames.
+        sums = {view: sums.get(view, {}) for view in parts if view in sums or not frames}
+        frames[sequence.group] += int((sequence.truth >= 0).sum())
+        for view, of_groups in sums.items():
+            of_groups[sequence.group] = of_groups.get(sequence.group, 0.0) + losses(parts[view])
+    return frames, sums
+
+
+def _told(loss: float, frames: int) -> float:
+    """The loss of a frame, in six digits: a file to read, and the last bits of a sum differ from machine to machine."""
+    return max(0.0, float(f"{loss / frames:.6g}"))
 
 
 def losses(sequence: HeldOut) -> Floats:

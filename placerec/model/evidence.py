@@ -110,11 +110,13 @@ def held_out(
     streams: Iterable[WordStream],
     vocabularies: Mapping[str, Sequence[str]],
     options: ModelOptions,
+    group: int = 0,
+    views: Sequence[str] = (),
 ) -> Iterator[HeldOut]:
     """Streams that trained nothing, as models and transitions of `training` see them.
 
-    Frames of places that the training does not know are not judged. Raises LanguageModelError if no model can be
-    estimated.
+    `group`, `views`: see `HeldOut`; the views in the order of `vocabularies`. Frames of places that the training does
+    not know are not judged. Raises LanguageModelError if no model can be estimated.
     """
     places = training.places
     if not places:
@@ -129,7 +131,7 @@ def held_out(
     steps, shares = training.step_counts(), shares_of(training.frame_counts())
     for stream in streams:
         (part,) = evidence_in(stream, dictionaries, selection=options.select, per="frame", max_gap=None)
-        yield HeldOut(part, stream.table.places.codes(places), steps, shares)
+        yield HeldOut(part, stream.table.places.codes(places), steps, shares, group, tuple(views))
 
 
 def group_borders(sequences: int) -> list[slice]:

@@ -27,7 +27,7 @@ from placerec.files import read_text, write_text
 from placerec.frames.places import check_place
 from placerec.hohmm import Calibration
 from placerec.hohmm.unknown import Histogram
-from placerec.hohmm.weights import Weights, shares_of
+from placerec.hohmm.weights import ViewWorth, Weights, shares_of
 from placerec.lm import BackoffModel, read_arpa
 from placerec.model.options import ModelOptions
 from placerec.model.record import LearnedSequence, Record, Route
@@ -154,6 +154,7 @@ class LearnedEvidence:
             "log_loss": weights.log_loss,
             "unweighted_log_loss": weights.unweighted,
             "judged": weights.frames,
+            **({"views": {name: vars(one) for name, one in weights.views.items()}} if weights.views else {}),
             "sequences": self.sequences,
             "redone": "words, models, transitions" if self.words else "models, transitions",
             "frames": dict(self.frames),
@@ -170,6 +171,10 @@ class LearnedEvidence:
             None if best is None else float(best),
             None if unweighted is None else float(unweighted),
             _count(values["judged"]),
+            {
+                name: ViewWorth(float(one["without"]), _count(one["better"]), _count(one["groups"]))
+                for name, one in values.get("views", {}).items()
+            },
         )
         if not (0 < weights.alpha < math.inf and 0 <= weights.memory <= 1):
             raise ValueError(weights)

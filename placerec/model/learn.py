@@ -28,9 +28,12 @@ from placerec.vision import DescriptorSpec, DictionarySet, DictionarySetOptions,
 from placerec.vision.chunks import Source
 from placerec.vision.describe import keep_described
 from placerec.vision.external import read_rows
-from placerec.vision.learning import some_rows
+from placerec.vision.learning import some_columns, some_rows
+from placerec.vision.options import View
 from placerec.words.folder import dictionary_of, each_stream, fill_folder, stream_files
 from placerec.words.tokenize import streams_of_rows
+
+log = logging.getLogger(__name__)
 
 
 def learn_model(
@@ -84,14 +87,24 @@ def learn_folder(
 ) -> LearnedEvidence:
     """Learn from descriptors, and write all that `learn_model` writes into a folder that is there.
 
-    `values`: the descriptors, of `spec`, of the frames in `table`, in memory or streamed. Arguments and errors
-    otherwise are those of `learn_model`.
+    `values`: the descriptors, of `spec`, of the frames in `table`, in memory or streamed. Of several views those are
+    left out, one after the other, that `hohmm.weights.Weights` calls superfluous. Arguments and errors otherwise are
+    those of `learn_model`.
     """
     made = DictionarySet.fit(values, spec=spec, places=table.places, options=words, work=work)
+    weights = learn_weights_anew(values, table, spec, made.options, options, work)
+    view = weights.superfluous
+    if view is not None:
+        worth = weights.views[view]
+        told = "the view %s is left out: log loss %.3f instead of %.3f without it, and less in each of %d groups"
+        log.info(told, view, worth.without, weights.log_loss, worth.groups)
+        views = tuple(one for one in made.options.views if one != view)
+        part = spec.part(*dict.fromkeys(kind for one in views for kind in View.parse(one).part_of(spec).kinds))
+        values, words = some_columns(values, spec.columns_of(part)), replace(made.options, views=views)
+        return learn_folder(folder, values, table, part, words, options, work)
     names = tuple(table.by_sequence())
     made = DictionarySet(tuple(replace(one, sequences=names) for one in made.dictionaries))
-    weigh = partial(learn_weights_anew, values, table, spec, made.options, options, work)
-    return learn_models(folder, values, table, spec, made, options, weigh)
+    return learn_models(folder, values, table, spec, made, options, lambda: weights)
 
 
 def learn_models(
@@ -130,7 +143,7 @@ def learn_weights_anew(
     dictionaries = len(words.views) * len(words.sizes)
 
     def held() -> Iterator[HeldOut]:
-        for group in group_borders(len(names)):
+        for number, group in enumerate(group_borders(len(names))):
             left = np.zeros(len(table), bool)
             left[np.concatenate([rows[name] for name in names[group]])] = True
             training = some_rows(values, ~left)
@@ -140,7 +153,8 @@ def learn_weights_anew(
             vocabularies = {one.name: one.vocabulary for one in made.dictionaries}
             counts = count_places(streams_of_rows(training, others, made, spec), vocabularies, options)
             streams = streams_of_rows(some_rows(values, left), table.take(left), made, spec)
-            yield from held_out(counts, streams, vocabularies, options)
+            views = [one.view for one in made.dictionaries]
+            yield from held_out(counts, streams, vocabularies, options, number, views)
 
     return chosen(held(), dictionaries)
 

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,16 @@ from placerec.evaluation.metrics import evaluate
 from placerec.hohmm import Recognizer, filter_stream, learned_transition
 from placerec.hohmm.evidence import DictionaryModels, evidence_in
 from placerec.hohmm.unknown import UnknownModel
-from placerec.hohmm.weights import ALPHAS, MEMORIES, HeldOut, choose_weights, losses, shares_of
+from placerec.hohmm.weights import (
+    ALPHAS,
+    MEMORIES,
+    HeldOut,
+    ViewWorth,
+    Weights,
+    choose_weights,
+    losses,
+    shares_of,
+)
 from placerec.lm import BackoffModel, count_ngrams, estimate, smoothing
 from placerec.lm.backoff import unite_models
 from placerec.words import Selection, WordStream, sentences_per_place
@@ -183,6 +193,44 @@ def test_the_weights_with_the_least_loss_are_chosen() -> None:
     assert found.frames == 120
     assert found.log_loss == pytest.approx(total.min() / 120, rel=1e-5)
     assert found.unweighted == pytest.approx(total[0, ALPHAS.index(1.0)] / 120, rel=1e-5)
+
+
+def test_it_is_told_what_the_words_of_each_view_are_worth() -> None:
+    one, two, three = (
+        replace(held(several_words(name, 13 + group)), group=group, views=("plain", "plain", "pn"))
+        for group, name in enumerate("abc")
+    )
+    found = choose_weights([one, two, three], 3)
+    assert list(found.views) == ["plain", "pn"]
+    for view, dictionaries in (("plain", [2]), ("pn", [0, 1])):
+        alone = [
+            replace(each, evidence=replace(each.evidence, own=each.evidence.own[dictionaries]), views=())
+            for each in (one, two, three)
+        ]
+        assert found.views[view].without == choose_weights(alone, 3).log_loss
+        better = sum(
+            bool(losses(less).min() < losses(each).min()) for less, each in zip(alone, (one, two, three), strict=True)
+        )
+        assert (found.views[view].better, found.views[view].groups) == (better, 3)
+
+
+def test_of_a_view_that_a_sequence_lacks_nothing_is_told() -> None:
+    one = replace(held(several_words("a", 13)), views=("plain", "pn", "half"))
+    other = replace(held(several_words("b", 14)), group=1, views=("plain", "pn", "pn"))
+    assert list(choose_weights([one, other], 3).views) == ["plain", "pn"]
+    alone = replace(held(several_words("a", 13)), views=("plain", "plain", "plain"))
+    assert not choose_weights([alone], 3).views
+
+
+def test_a_view_is_superfluous_if_every_group_is_better_without_it() -> None:
+    def weights(**views: ViewWorth) -> Weights:
+        return Weights(0.5, 0.0, 0.3, 0.9, 100, views)
+
+    assert weights(a=ViewWorth(0.2, 4, 5), b=ViewWorth(0.4, 0, 5)).superfluous is None
+    assert weights(a=ViewWorth(0.25, 5, 5), b=ViewWorth(0.2, 5, 5)).superfluous == "b"
+    # Two groups are easily better by chance, and what is better for each alone may not be so for one alpha.
+    assert weights(a=ViewWorth(0.2, 2, 2)).superfluous is None
+    assert weights(a=ViewWorth(0.3, 3, 3)).superfluous is None
 
 
 def test_the_loss_of_one_place_is_0_and_not_minus_0() -> None:

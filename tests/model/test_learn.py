@@ -13,7 +13,6 @@ from placerec.methods import decode
 from placerec.model import ModelOptions, load_model, train_lm
 from placerec.model.learn import weigher
 from placerec.vision import (
-    DEFAULT_KIND,
     DescriptorSpec,
     DictionarySetOptions,
     describe_sources,
@@ -33,12 +32,16 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def test_it_writes_what_the_single_commands_write(tmp_path: Path, runs: list[Path]) -> None:
-    learn(runs[:3], tmp_path / "model", words=WORDS)
-    described = DescriptorSpec(kind=DEFAULT_KIND)
-    describe_sources(runs[:3], tmp_path / "descriptors.npz", spec=described)
-    train_dictionary(runs[:3], tmp_path / "words.npz", options=WORDS)
-    tokenize(runs[:3], tmp_path / "words.npz", tmp_path / "tokens")
+@pytest.mark.parametrize(("sequences", "views"), [(2, 4), (3, 3)])
+def test_it_writes_what_the_single_commands_write(tmp_path: Path, runs: list[Path], sequences: int, views: int) -> None:
+    training = runs[:sequences]
+    found = learn(training, tmp_path / "model", words=WORDS)
+    # Only of three groups of sequences can a view be left out.
+    assert len(found.dictionaries.options.views) == views
+    words = replace(WORDS, views=found.dictionaries.options.views)
+    describe_sources(training, tmp_path / "descriptors.npz", spec=DescriptorSpec(kind=words.kind()))
+    train_dictionary(training, tmp_path / "words.npz", options=words)
+    tokenize(training, tmp_path / "words.npz", tmp_path / "tokens")
     weigh = weigher([tmp_path / "tokens"], tmp_path / "words.npz", tmp_path / "descriptors.npz", ModelOptions())
     train_lm([tmp_path / "tokens"], tmp_path / "steps", weigh=weigh)
     learned, steps = files(tmp_path / "model"), files(tmp_path / "steps")
@@ -69,7 +72,7 @@ def test_tests_train_nothing_and_are_judged(tmp_path: Path, runs: list[Path]) ->
     lines = format_learned(found).splitlines()
     assert [line.split()[0] for line in lines] == ["words", "places", "weights", "tests", "model"]
     assert "majority class 50.0 %" in lines[3]
-    assert lines[0].endswith(" frames of 3 sequences")
+    assert lines[0].endswith(" frames of 3 sequences; in brackets the log loss without a view")
     assert lines[3].endswith(" on 16 frames of 1 sequence")
 
 
