@@ -20,7 +20,12 @@ from placerec.cli import shared
     type=shared.PATH,
     help="What to test on; left out of TRAIN if it is there.  [repeatable]",
 )
-@click.option("--methods", metavar="A,B,...", help="Only these methods.  [default: all]")
+@click.option(
+    "--methods",
+    metavar="A,B,...",
+    help="Only these methods; those of descriptors on any view: knn@lbp:pn, rbf-svm-hmm@views-tuned.  "
+    "[default: all, on the views plain and pn]",
+)
 @shared.words_option(False, "Your own dictionaries, where they are not to be learned from TRAIN.")
 @shared.network_option
 @shared.matrix_option

@@ -1,17 +1,18 @@
 """What a frame costs before any method sees it."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from time import perf_counter
 
 import numpy as np
 
+from placerec.arrays import Singles
 from placerec.errors import SourceError
 from placerec.experiments.store import WordsJob, key_of, load, save
 from placerec.frames import Sequence as FrameSequence, images_at
 from placerec.frames.sequence import Image
-from placerec.vision import Descriptors, Dictionary, DictionarySet, descriptor
+from placerec.vision import Descriptors, DescriptorSpec, Dictionary, DictionarySet, descriptor
 
 # Images that the cost is measured on, and descriptors that it is where these were computed elsewhere.
 TIMED, MANY = 30, 300
@@ -41,16 +42,37 @@ def front_end_cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dict
     if dictionary.spec.kind == "npy":
         cost = FrontEndCost(math.nan, _microseconds_of_words(dictionary, tests))
     else:
-        spent = []
-        for image in _spread_images(sequences, tests, dictionary.spec.colours):
-            started = perf_counter()
-            row = descriptor(image, dictionary.spec)[None]
-            described = perf_counter()
-            dictionary.words(row)
-            spent.append((described - started, perf_counter() - described))
-        cost = FrontEndCost(*(1e6 * np.mean(spent, axis=0)).tolist())
+        cost = _measured(sequences, tests, dictionary.spec, dictionary.words)
     save(path, asdict(cost))
     return cost
+
+
+def description_cost(job: WordsJob, tests: Sequence[Descriptors], spec: DescriptorSpec) -> float:
+    """The microseconds of `front_end_cost` that it takes to describe a frame by `spec`, which is made of images."""
+    sequences = [one.sequence for one in job.test]
+    path = job.cache / "costs" / f"{key_of('description', spec.as_dict(), [s.name for s in sequences])}.json"
+    kept = load(path)
+    if not kept:
+        kept = {"descriptor": _measured(sequences, tests, spec, lambda row: None).descriptor}
+        save(path, kept)
+    return float(kept["descriptor"])
+
+
+def _measured(
+    sequences: Sequence[FrameSequence],
+    tests: Sequence[Descriptors],
+    spec: DescriptorSpec,
+    use: Callable[[Singles], object],
+) -> FrontEndCost:
+    """What it takes to describe an image, and for a row of one descriptor to be used."""
+    spent = []
+    for image in _spread_images(sequences, tests, spec.colours):
+        started = perf_counter()
+        row = descriptor(image, spec)[None]
+        described = perf_counter()
+        use(row)
+        spent.append((described - started, perf_counter() - described))
+    return FrontEndCost(*(1e6 * np.mean(spent, axis=0)).tolist())
 
 
 def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descriptors], colours: bool) -> Iterator[Image]:

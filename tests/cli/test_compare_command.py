@@ -45,6 +45,7 @@ def test_it_prints_a_table_and_writes_the_folder(runs: Path, tmp_path: Path) -> 
     ("arguments", "code", "words"),
     [
         (["--methods", "hohmm,svm"], 2, ("--methods", "'svm'", "torralba2003")),
+        (["--methods", "hohmm,knn@nose:pn"], 2, ("--methods", "knn@nose:pn: no view", "'nose:pn'", "lbp")),
         (["--methods", ""], 2, ("--methods", "''")),
         ([], 1, ("none is left to learn from",)),
     ],

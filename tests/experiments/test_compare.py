@@ -15,9 +15,9 @@ from helpers.small_world import write_images
 
 from placerec.errors import EvaluationError, MissingExtraError, OutputError, PlacerecError
 from placerec.experiments import store
-from placerec.experiments.comparison import benchmark, methods
+from placerec.experiments.comparison import benchmark, methods, run as run_module
 from placerec.experiments.comparison.benchmark import Benchmark, MethodRun
-from placerec.experiments.comparison.methods import COMPARED, ComparedMethod
+from placerec.experiments.comparison.methods import ComparedMethod, method_of
 from placerec.experiments.comparison.results import Comparison, format_comparison
 from placerec.experiments.comparison.run import compare
 from placerec.figures.evaluation import evaluate_files
@@ -143,8 +143,9 @@ def test_a_killed_run_goes_on_where_it_was(
             raise KeyboardInterrupt
         return method.run(benchmark)
 
-    for name, method in COMPARED.items():
-        monkeypatch.setitem(COMPARED, name, replace(method, run=partial(killed, name, method)))
+    monkeypatch.setattr(
+        run_module, "method_of", lambda name: replace(method_of(name), run=partial(killed, name, method_of(name)))
+    )
     with pytest.raises(KeyboardInterrupt):
         run(runs, out, cache=done[0] / "cache")
     assert not (out / "methods.csv").exists()

@@ -1,6 +1,6 @@
 """Every method on the same test frames: encoded, fitted, run on-line one frame after the other, and timed."""
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
@@ -10,21 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from placerec.arrays import Floats, Ints, Singles
-from placerec.errors import EvaluationError, VisionError
+from placerec.arrays import Floats, Ints
+from placerec.experiments.comparison.views import PLAIN, SeenView
 from placerec.experiments.cost import FrontEndCost, front_end_cost
 from placerec.experiments.several import SeveralDictionaries
 from placerec.experiments.store import WordsJob, key_of
-from placerec.frames.table import Labels
 from placerec.hohmm import Beliefs
 from placerec.methods.descriptors import DescriptorTrainingSet, FitPoints
 from placerec.model import ModelOptions, PlaceModels, load_model, train_model
 from placerec.model.record import record_streams
 from placerec.vision import Dictionary
-from placerec.vision.chunks import spooled
-from placerec.vision.options import PROJECTIONS
-from placerec.vision.pca import project
-from placerec.vision.views import place_normalised, place_numbers
 from placerec.words import Selection, WordStream, place_steps, sentences_per_place
 from placerec.words.tokenize import tokens_of
 
@@ -35,20 +30,14 @@ StepFunction = Callable[[Any], Floats]
 MakeStepper = Callable[[], StepFunction]
 # Chooses the options of a method of descriptors by its training and a seed: what then fits it to a training set.
 ChooseOptions = Callable[..., FitPoints]
-# The views of `vision.views` that such methods are compared on.
-PLAIN, NORMALISED = PROJECTIONS[:2]
 
 
 @dataclass(frozen=True)
 class EncodedSequences:
-    """All sequences through one dictionary, those of the training first.
-
-    `streams`: the words of each sequence; `points`: by projection the components float32 (T, k) of its T frames.
-    """
+    """The words of all sequences through one dictionary, those of the training first."""
 
     dictionary: Dictionary
     streams: tuple[WordStream, ...] = field(repr=False)
-    points: Mapping[str, tuple[Singles, ...]] = field(repr=False)
     cost: FrontEndCost
 
     def units(self, sequence: int) -> Ints:
@@ -57,38 +46,27 @@ class EncodedSequences:
         return np.array([number[word] for word in self.streams[sequence].words], np.int64)
 
 
-def encode(job: WordsJob, dictionary: Dictionary, views: Container[str]) -> EncodedSequences:
-    """Give all frames of a job their words and their components: PLAIN, and of `views`.
-
-    Raises VisionError or SourceError for images, and EvaluationError for labels that give no place-normalised view.
-    """
-    training = len(job.train)
+def encode(job: WordsJob, dictionary: Dictionary) -> EncodedSequences:
+    """Give all frames of a job their words; raises VisionError or SourceError for images."""
     found = [one.load() for one in (*job.train, *job.test)]
     streams = tuple(stream for one in found for stream in tokens_of(one, dictionary))
-    points = {PLAIN: tuple(project(one.values, dictionary.pca) for one in found)}
-    if NORMALISED in views:
-        places = Labels.concat([one.table.places for one in found[:training]])
-        try:
-            with spooled(np.concatenate(points[PLAIN][:training])) as codes:
-                pca = place_normalised(dictionary.pca, codes, place_numbers(places, codes.rows))
-        except VisionError as error:
-            raise EvaluationError(f"no view for the methods @{NORMALISED}: {error}; leave them out") from error
-        points[NORMALISED] = tuple(project(one.values, pca) for one in found)
-    return EncodedSequences(dictionary, streams, points, front_end_cost(job, found[training:], dictionary))
+    return EncodedSequences(dictionary, streams, front_end_cost(job, found[len(job.train) :], dictionary))
 
 
 @dataclass(frozen=True)
 class Benchmark:
     """The sequences through one dictionary, the first `training` of them to learn from, and the models of these.
 
-    `second`: the sequences through a second dictionary, where a method asks for it, and `several`: what `learn` makes
-    of them, and `several_cost`: what a frame's words cost there. `seed`: of what a method draws.
+    `views`: by name, what methods of descriptors see of the sequences. `second`: the sequences through a second
+    dictionary, where a method asks for it, and `several`: what `learn` makes of them, and `several_cost`: what a
+    frame's words cost there. `seed`: of what a method draws.
     """
 
     encoded: EncodedSequences
     training: int
     models: PlaceModels
     seed: int
+    views: Mapping[str, SeenView]
     second: EncodedSequences | None = None
     several: SeveralDictionaries | None = None
     several_cost: FrontEndCost | None = None
@@ -108,7 +86,7 @@ class Benchmark:
         streams = self.encoded.streams[: self.training]
         truth = np.concatenate([stream.table.places.codes(self.places) for stream in streams])
         sequences = np.repeat(np.arange(len(streams)), [len(stream) for stream in streams])
-        points = np.concatenate(self.encoded.points[view][: self.training]).astype(np.float64)
+        points = np.concatenate(self.views[view].points[: self.training]).astype(np.float64)
         steps = np.sum([place_steps(stream, self.places) for stream in streams], axis=0)
         known = truth >= 0
         return DescriptorTrainingSet(points[known], truth[known], sequences[known], self.places, steps)
@@ -125,9 +103,9 @@ class Benchmark:
 
     @cached_property
     def key(self) -> str:
-        """A digest of all that beliefs depend on, but for the method and the second dictionary."""
+        """A digest of all that beliefs depend on, but for the method, other views and other dictionaries."""
         parts: list[object] = [self.training, self.seed, self.encoded.dictionary.fingerprint]
-        for stream, points in zip(self.encoded.streams, self.encoded.points[PLAIN], strict=True):
+        for stream, points in zip(self.encoded.streams, self.views[PLAIN].points, strict=True):
             parts += [stream.name, stream.frames, stream.places, stream.words, stream.times, points]
         return key_of(*parts)
 

@@ -10,7 +10,7 @@ import numpy as np
 from placerec.arrays import Floats
 from placerec.evaluation.bootstrap import LEAST
 from placerec.evaluation.summary import percent, shorten
-from placerec.experiments.comparison.methods import COMPARED, WORDS
+from placerec.experiments.comparison.methods import DESCRIPTORS, SEVERAL_WORDS, TWO_WORDS, WORDS, method_of
 from placerec.experiments.comparison.results import Comparison, MethodScore
 from placerec.figures.canvas import MARGIN, figure_file, panel, place_colours, write_line
 
@@ -24,7 +24,7 @@ _NAMES, _ACCURACY, _SHARES, _COST = 1.65, 4.6, 0.75, 2.2
 # The least cost that is drawn, in microseconds.
 _LEAST_COST = 0.1
 _SHADE, _SOFT = "0.945", "0.35"
-_KINDS = tuple(dict.fromkeys([WORDS, *(method.kind for method in COMPARED.values())]))
+_KINDS = (WORDS, SEVERAL_WORDS, TWO_WORDS, DESCRIPTORS)
 
 
 def plot_comparison(found: Comparison, path: Path | str) -> None:
@@ -149,7 +149,7 @@ def _legend(figure: "Figure", scores: Sequence[MethodScore], told: bool) -> None
 
 
 def _kind(score: MethodScore) -> str:
-    return COMPARED[score.method].kind if score.method in COMPARED else WORDS
+    return method_of(score.method).kind
 
 
 def _caption(found: Comparison) -> list[str]:

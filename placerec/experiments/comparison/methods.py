@@ -1,6 +1,8 @@
-"""The methods that are compared.
+"""The methods that are compared, and their names.
 
-A method is added in COMPARED alone: how it is fitted and run, what it is made of, and what it needs.
+A method is added in one of two tables: OF_WORDS, or OF_DESCRIPTORS, whose methods run on any view (`comparison.views`).
+A name of theirs is `NAME`, `NAME@VIEW`, and where there is a filter whose evidence gets a weight and that forgets
+(`methods.evidence_weight`) `NAME@tuned`, `NAME@VIEW-tuned`: `rbf-svm`, `knn@lbp:pn`, `rbf-svm-hmm@views-tuned`.
 """
 
 import math
@@ -11,9 +13,8 @@ from functools import partial
 import numpy as np
 
 from placerec.arrays import Floats
+from placerec.errors import EvaluationError, VisionError
 from placerec.experiments.comparison.benchmark import (
-    NORMALISED,
-    PLAIN,
     RUNS,
     Benchmark,
     ChooseOptions,
@@ -22,6 +23,7 @@ from placerec.experiments.comparison.benchmark import (
     StepFunction,
     timed,
 )
+from placerec.experiments.comparison.views import ALL, NORMALISED, PLAIN
 from placerec.hohmm import Recognizer, SequenceDecoder, learned_transition
 from placerec.hohmm.weights import shares_of
 from placerec.lm.backoff import unite_models
@@ -42,10 +44,13 @@ from placerec.methods.margins import frame_by_frame, likelihoods
 from placerec.methods.tables import PairEmissions
 from placerec.model import Decoding, transition_of
 from placerec.model.decoding import TransitionName
+from placerec.vision.options import View
 
 # What a method gets of a frame.
-WORDS, TWO_WORDS, DESCRIPTORS = "words", "words, two dictionaries", "descriptors"
-SEVERAL_WORDS = "words, several dictionaries"
+WORDS, SEVERAL_WORDS = "words", "words, several dictionaries"
+TWO_WORDS, DESCRIPTORS = "words, two dictionaries", "descriptors"
+# How a method of descriptors is fitted to the training frames as points of a view.
+FitView = Callable[[Benchmark, str], MakePointStepper]
 
 
 @dataclass(frozen=True)
@@ -117,10 +122,12 @@ def _run_several(benchmark: Benchmark) -> MethodRun:
     return MethodRun(run.beliefs, run.microseconds + more)
 
 
-def _run_points(fit: Callable[[Benchmark], MakePointStepper], view: str, benchmark: Benchmark) -> MethodRun:
-    """A method of descriptors, which learns from the labelled training frames as points of a view."""
-    tests = [benchmark.encoded.points[view][i].astype(np.float64) for i in benchmark.tests]
-    return timed(fit(benchmark), benchmark, tests)
+def _run_points(fit: FitView, view: str, benchmark: Benchmark) -> MethodRun:
+    """A method of descriptors on the points of a view; what describing a frame takes more for it is added."""
+    seen = benchmark.views[view]
+    tests = [seen.points[i].astype(np.float64) for i in benchmark.tests]
+    run = timed(fit(benchmark, view), benchmark, tests)
+    return MethodRun(run.beliefs, run.microseconds + seen.microseconds)
 
 
 def _run_cascade(benchmark: Benchmark) -> MethodRun:
@@ -148,42 +155,35 @@ def _run_cascade(benchmark: Benchmark) -> MethodRun:
     return MethodRun(run.beliefs, run.microseconds + share * (cost.descriptor + cost.word), share)
 
 
-def _of_descriptors(view: str) -> dict[str, ComparedMethod]:
-    """The methods of descriptors, on the components of a view, which marks all but those of the view `plain`.
+@dataclass(frozen=True)
+class _OfDescriptors:
+    """A method of descriptors: how it is fitted, with a weight of its evidence if it has a filter, and its package."""
 
-    A filter whose evidence has a weight, and that forgets (`evidence_weight`), is marked as tuned.
-    """
-    mark, tuned = ("", "@tuned") if view == PLAIN else (f"@{view}", f"@{view}-tuned")
+    fit: FitView
+    tuned: FitView | None = None
+    package: str | None = "sklearn"
 
-    def method(fit: Callable[[Benchmark], MakePointStepper], package: str | None = "sklearn") -> ComparedMethod:
-        return ComparedMethod(partial(_run_points, fit, view), DESCRIPTORS, package, view)
 
-    def in_filter(
-        name: str, fit: Callable[[Benchmark], FitPoints], package: str | None = "sklearn"
-    ) -> dict[str, ComparedMethod]:
-        return {
-            f"{name}{mark}": method(lambda one: through_filter(one.points(view), fit(one)), package),
-            f"{name}{tuned}": method(lambda one: evidence_weight.fit(one.points(view), fit(one)), package),
-        }
+def _in_filter(fit: Callable[[Benchmark, str], FitPoints], package: str | None = "sklearn") -> _OfDescriptors:
+    """The filter over the likelihoods that `fit` says how to fit."""
+    return _OfDescriptors(
+        lambda one, view: through_filter(one.points(view), fit(one, view)),
+        lambda one, view: evidence_weight.fit(one.points(view), fit(one, view)),
+        package,
+    )
 
-    def machine(name: str, choose: ChooseOptions) -> dict[str, ComparedMethod]:
-        return {
-            f"{name}{mark}": method(lambda one: frame_by_frame(one.chosen(choose, view)(one.points(view)))),
-            **in_filter(f"{name}-hmm", lambda one: partial(likelihoods, one.chosen(choose, view))),
-        }
 
+def _machine(name: str, choose: ChooseOptions) -> dict[str, _OfDescriptors]:
+    """A machine that gives margins, frame by frame and through the filter."""
     return {
-        **in_filter("torralba2003", lambda one: one.chosen(torralba2003.choose, view), None),
-        **machine("ullah2008", ullah2008.choose),
-        f"knn{mark}": method(lambda one: knn.fit(one.points(view))),
-        **machine("logistic", logistic.choose),
-        **machine("rbf-svm", rbf_svm.choose),
+        name: _OfDescriptors(lambda one, view: frame_by_frame(one.chosen(choose, view)(one.points(view)))),
+        f"{name}-hmm": _in_filter(lambda one, view: partial(likelihoods, one.chosen(choose, view))),
     }
 
 
-# In the order of the table. The paper's transitions where a method has a filter, unless its source learns them, or it
-# stands beside `hohmm`.
-COMPARED: dict[str, ComparedMethod] = {
+# Both in the order of the table. The paper's transitions where a method has a filter, unless its source learns them, or
+# it stands beside `hohmm`.
+OF_WORDS: dict[str, ComparedMethod] = {
     HOHMM: ComparedMethod(_run_several, SEVERAL_WORDS),
     f"{HOHMM}-single": _words(HOHMM, "learned"),
     f"{HOHMM}-paper": _words(HOHMM),
@@ -191,6 +191,49 @@ COMPARED: dict[str, ComparedMethod] = {
     **{name: _words(name, "learned" if name == "mtd" else "fixed") for name in METHODS if name != HOHMM},
     **{f"{name}@tuned": ComparedMethod(partial(_run_weighed, name)) for name, own in METHODS.items() if own.emissions},
     "pronobis2007": ComparedMethod(_run_cascade, TWO_WORDS),
-    **_of_descriptors(PLAIN),
-    **_of_descriptors(NORMALISED),
 }
+OF_DESCRIPTORS: dict[str, _OfDescriptors] = {
+    "torralba2003": _in_filter(lambda one, view: one.chosen(torralba2003.choose, view), None),
+    **_machine("ullah2008", ullah2008.choose),
+    "knn": _OfDescriptors(lambda one, view: knn.fit(one.points(view))),
+    **_machine("logistic", logistic.choose),
+    **_machine("rbf-svm", rbf_svm.choose),
+}
+
+
+def _on(view: str) -> list[str]:
+    """The names of all methods of descriptors on a view, each that has a filter also with its evidence weighed."""
+    seen = "" if view == PLAIN else view
+    forms = [(name, tuned) for name, own in OF_DESCRIPTORS.items() for tuned in ("", "tuned")[: 1 + bool(own.tuned)]]
+    return ["@".join(filter(None, (name, "-".join(filter(None, (seen, tuned)))))) for name, tuned in forms]
+
+
+# What is compared where no methods are named: the strongest also on all that `hohmm` sees.
+DEFAULT: tuple[str, ...] = (
+    *(*OF_WORDS, *_on(PLAIN), *_on(NORMALISED)),
+    *(f"rbf-svm@{ALL}", f"rbf-svm-hmm@{ALL}-tuned"),
+)
+# What a message says of the names.
+CHOICES = (
+    f"choose from {', '.join((*OF_WORDS, *OF_DESCRIPTORS))}; all from {next(iter(OF_DESCRIPTORS))} on also on a view: "
+    f"knn@lbp:pn, rbf-svm-hmm@{ALL}-tuned"
+)
+
+
+def method_of(name: str) -> ComparedMethod:
+    """The method of a name; EvaluationError for an unknown one, and for a view that cannot be."""
+    if name in OF_WORDS:
+        return OF_WORDS[name]
+    base, at, mark = name.partition("@")
+    view, _, last = mark.rpartition("-")
+    own, tuned = OF_DESCRIPTORS.get(base), last == "tuned"
+    fit = None if own is None else own.tuned if tuned else own.fit
+    if own is None or fit is None or (at and not mark):
+        raise EvaluationError(f"no method is called {name!r}; {CHOICES}")
+    view = (view if tuned else mark) or PLAIN
+    try:
+        if view != ALL:
+            View.parse(view)
+    except VisionError as error:
+        raise EvaluationError(f"{name}: {error}; {ALL} are all of {HOHMM} together") from error
+    return ComparedMethod(partial(_run_points, fit, view), DESCRIPTORS, own.package, view)

@@ -19,9 +19,10 @@ from placerec.errors import EvaluationError, SourceError, check_optional
 from placerec.evaluation.bootstrap import LEAST
 from placerec.experiments.comparison.benchmark import Benchmark, MethodRun, encode, train_models
 from placerec.experiments.comparison.figure import plot_comparison
-from placerec.experiments.comparison.methods import COMPARED, SEVERAL_WORDS, TWO_WORDS
+from placerec.experiments.comparison.methods import CHOICES, DEFAULT, SEVERAL_WORDS, TWO_WORDS, method_of
 from placerec.experiments.comparison.page import comparison_page
 from placerec.experiments.comparison.results import Comparison, format_methods, format_pairs, judge
+from placerec.experiments.comparison.views import PLAIN, check_views, see
 from placerec.experiments.cost import front_end_cost
 from placerec.experiments.several import learn_several
 from placerec.experiments.store import Described, WordsJob, describe_all, held_output, keep_given, key_of, load
@@ -75,19 +76,20 @@ def compare(
 ) -> Comparison:
     """Learn on the sequences of `train` that `test` does not name, run every method on those of `test`, write `out`.
 
-    `words`: a words.npz whose dictionaries `hohmm` uses, all others that of the view `plain` that comes first there;
-    without it they are learned from the training sequences, `size` being that of all methods but `hohmm`. `network`:
-    the file of the image network, for words of one. `matrix`: a .npy or .npz file of descriptors that were computed
-    elsewhere (`vision.external`); the rows of a .npy are those of the sequences as `train` names them, and then of
-    those that `test` alone does. `seed`: of dictionaries, prototypes and the bootstrap. What an earlier run into `out`
-    has done on the same data is kept; `cache`: the folder for it, by default in `out`. `progress(label)` is a context
-    manager that gives a callback(done, total). Raises EvaluationError for an unknown method and for what nothing can be
-    compared on, MissingExtraError for what is not installed, VisionError for `words` and a `matrix` that cannot be
-    used, and what `find_sequences` raises.
+    `methods`: their names; those of descriptors on any view: `knn@lbp:pn`, `rbf-svm-hmm@views-tuned`. `words`: a
+    words.npz whose dictionaries `hohmm` uses, all others that of the view `plain` that comes first there; without it
+    they are learned from the training sequences, `size` being that of all methods but `hohmm`. `network`: the file of
+    the image network, for words of one. `matrix`: a .npy or .npz file of descriptors that were computed elsewhere
+    (`vision.external`); the rows of a .npy are those of the sequences as `train` names them, and then of those that
+    `test` alone does. `seed`: of dictionaries, prototypes and the bootstrap. What an earlier run into `out` has done on
+    the same data is kept; `cache`: the folder for it, by default in `out`. `progress(label)` is a context manager that
+    gives a callback(done, total). Raises EvaluationError for an unknown method and for what nothing can be compared on,
+    MissingExtraError for what is not installed, VisionError for `words` and a `matrix` that cannot be used, and what
+    `find_sequences` raises.
     """
     chosen = check_methods(methods, described=matrix is None)
     for name in chosen:
-        if package := COMPARED[name].package:
+        if package := method_of(name).package:
             check_optional(package, name, "leave it out of --methods")
     out = Path(out)
     check_figure(out / "methods.png")
@@ -153,45 +155,50 @@ def _benchmark(
 
     dictionary = _plain(given.words) if given.words else None
     spec = dictionary.spec if dictionary else None
+    asked = [method_of(name) for name in methods]
+    kinds, views = {one.kind for one in asked}, dict.fromkeys(one.view for one in asked)
     if given.matrix is not None:
         whole = first = job(keep_given(given.every, spec, given.matrix, cache))
+        check_views(views, whole.train[0].spec)
     else:
         # What several dictionaries see of a frame holds what the other methods do.
-        whole = job(described(given.words.spec if given.words else DescriptorSpec(kind=DEFAULT_KIND)))
+        every = given.words.spec if given.words else DescriptorSpec(kind=DEFAULT_KIND)
+        check_views(views, every)
+        whole = job(described(every))
         first = whole.part(spec or SPEC)
     learned = {one.kept for one in first.train}
     warn_of_training([one.sequence.name for one in first.test if one.kept in learned], "words and the models")
-    encoded = encode(first, dictionary or first.dictionary(), {COMPARED[name].view for name in methods})
-    kinds = {COMPARED[name].kind for name in methods}
+    encoded = encode(first, dictionary or first.dictionary())
+    seen = see(views, whole, encoded.dictionary, given.words)
     second = None
     if TWO_WORDS in kinds:
         other = job(described(SECOND))
-        second = encode(other, other.dictionary(), ())
+        second = encode(other, other.dictionary())
     several, cost = None, None
     if SEVERAL_WORDS in kinds:
         several = learn_several(whole, seed, given.words)
         cost = front_end_cost(whole, [one.load() for one in whole.test], several.dictionaries)
     training = len(given.training)
-    return Benchmark(encoded, training, train_models(encoded, training, cache), seed, second, several, cost)
+    return Benchmark(encoded, training, train_models(encoded, training, cache), seed, seen, second, several, cost)
 
 
 def check_methods(methods: Iterable[str] | None = None, *, described: bool = True) -> list[str]:
-    """The methods in the order of the table, all of them for None; EvaluationError for an unknown one or none.
+    """The names of methods in the order of the table, then others; DEFAULT for None.
 
-    Unless frames are `described` here, no method can ask for a second descriptor.
+    Raises EvaluationError for an unknown name and for none. Unless frames are `described` here, no method can ask for a
+    second descriptor.
     """
-    asking = [] if described else [name for name in COMPARED if COMPARED[name].kind == TWO_WORDS]
-    names = set(COMPARED.keys() - asking if methods is None else methods)
-    choice = f"choose from {', '.join(COMPARED)}"
-    if unknown := sorted(names.difference(COMPARED)):
-        raise EvaluationError(f"no method is called {unknown[0]!r}; {choice}")
-    if not names:
-        raise EvaluationError(f"no method is named; {choice}")
-    if known := sorted(names.intersection(asking)):
+    kinds = {name: method_of(name).kind for name in (DEFAULT if methods is None else methods)}
+    asking = [name for name, kind in kinds.items() if kind == TWO_WORDS and not described]
+    if methods is None:
+        return [name for name in kinds if name not in asking]
+    if not kinds:
+        raise EvaluationError(f"no method is named; {CHOICES}")
+    if asking:
         raise EvaluationError(
-            f"{known[0]} describes images itself, and the descriptors come from elsewhere; leave it out"
+            f"{asking[0]} describes images itself, and the descriptors come from elsewhere; leave it out"
         )
-    return [name for name in COMPARED if name in names]
+    return sorted(kinds, key=lambda name: DEFAULT.index(name) if name in DEFAULT else len(DEFAULT))
 
 
 def _split(train: Iterable[Path | str], test: Iterable[Path | str], source_options: SourceOptions) -> _Given:
@@ -226,13 +233,13 @@ def _split(train: Iterable[Path | str], test: Iterable[Path | str], source_optio
 
 def _method_run(name: str, benchmark: Benchmark, folder: Path) -> MethodRun:
     """The run in `folder` if it is one on the same data, or else a new one, which is left there."""
-    method = COMPARED[name]
-    more = ""
+    method = method_of(name)
+    more: list[object] = [] if method.view == PLAIN else [*benchmark.views[method.view].points]
     if benchmark.second and method.kind == TWO_WORDS:
-        more = benchmark.second.dictionary.fingerprint
+        more = [benchmark.second.dictionary.fingerprint]
     if benchmark.several and method.kind == SEVERAL_WORDS:
-        more = benchmark.several.models.folder.path.name
-    key = key_of(name, benchmark.key, more)
+        more = [benchmark.several.models.folder.path.name]
+    key = key_of(name, benchmark.key, *more)
     known = load(folder / RUN_JSON)
     if known.get("key") == key:
         log.info("%s: as the run before left it", name)
