@@ -1,38 +1,349 @@
-"""The table "GIST and CENTRIST" of docs/vision.md: single frames on a 20 x 20 map of live units.
+"""The tables of descriptors and of projections in docs/vision.md, and the results behind them.
 
-python docs/make/descriptors.py DATA/SET... [--test GLOB ...]
+python docs/make/descriptors.py [DATA] [--set NAME ...] [--network FILE[#LAYER]] [--work DIR]
+
+With DATA, the folder of the sets, words of every kind of descriptor that is made of images, of those of the default in
+one row and, with --network, of an image network are learned in every fold of weights.py: one dictionary of 20 x 20,
+transitions and the weight of words by what the token streams of the training tell. Tests are single frames, sequences
+as they are and in simulated light, and frames that a camera's faults or a light change. Beside these, projections of
+GIST (projections.py), and what describing costs (tests/benchmarks/descriptor_cost.py). What was done is kept in DIR, so
+that a run that was stopped goes on, and results are kept in docs/vision/. Then the tables of the page are written anew.
 """
 
+import argparse
+import csv
+import io
+import json
+import logging
+import os
+import subprocess
 import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from itertools import product
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
-from single_frame import SEEDS, answers, arguments, described, fitted, folds, majority, spread
+from light import relit_set
+from projections import PROJECTIONS, learned
+from single_frame import answers
+from weights import FOLDS, Figures, filled, kept
 
-HEAD = """\
-| set | test frames | majority class | GIST | CENTRIST |
-| --- | --- | --- | --- | --- |
-"""
+from placerec import find_sequences
+from placerec.arrays import Mask
+from placerec.evaluation.metrics import Evaluation, evaluate
+from placerec.experiments.grid.report import Table, markdown
+from placerec.files import content_digest, write_text
+from placerec.frames import Sequence as FrameSequence
+from placerec.inspection.word_stability import word_changes
+from placerec.methods import HOHMM, make_decoder
+from placerec.model import ModelOptions, load_model
+from placerec.model.folder import ModelFolder
+from placerec.model.learn import learn_models
+from placerec.vision import (
+    DEFAULT_KIND,
+    KINDS,
+    Descriptors,
+    DescriptorSpec,
+    Dictionary,
+    DictionaryOptions,
+    DictionarySet,
+    DictionarySetOptions,
+    describe,
+)
+from placerec.vision.light import LIGHTS
+from placerec.vision.network import Network
+from placerec.vision.onnx import open_network
+from placerec.vision.options import View
+from placerec.words.tokenize import tokens_of
+
+PAGE = Path(__file__).parents[1] / "vision.md"
+RESULTS = PAGE.with_suffix("") / "descriptors.csv"
+COSTS = RESULTS.with_name("cost.json")
+ONE_THREAD = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+BENCHMARK = Path(__file__).parents[2] / "tests/benchmarks/descriptor_cost.py"
+DESCRIPTOR, PROJECTION = "descriptor", "projection"
+SIZE, SIZES = 20, (10, 20)
+# Maps of each projection, by the seeds 0, 1, ...; descriptors have one map.
+SEEDS = 3
+# Frames of a set that a camera's faults and lights change.
+CHANGED = 100
+MADE = [kind for kind, one in KINDS.items() if one.describe is not None and kind != "onnx"]
+# What is changed about a frame whose word is looked at, of `placerec stability`, and by which name it is shown.
+FAULTS = {"JPEG": "JPEG", "noise": "noise", "blur": "blur", "shift by 1 pixel": "shift"}
+WORDS = [f"{name}: words" for name in (*FAULTS.values(), *LIGHTS)]
+FIGURES = ("frames", "single", "accuracy", "log_loss", *LIGHTS, *WORDS)
 
 
-def row(folder: Path, test: list[str]) -> str:
-    """A set's line: means over five maps."""
-    cells = []
-    for kind in ("gist", "centrist"):
-        frames = described(folder, kind)
-        tests = folds(frames, test)
-        right = [list[np.bool_]() for _ in SEEDS]
-        for mask in tests:
-            for seed, dictionary in enumerate(fitted(frames, mask)):
-                right[seed].extend(answers(dictionary, frames, mask))
-        cells.append(spread([float(np.mean(one)) for one in right]))
-    share, asked = majority(frames, tests)
-    return f"| {folder.name} | {asked} | {share:.3f} | {' | '.join(cells)} |\n"
+class Task(NamedTuple):
+    """Which words are judged: those of a view (DESCRIPTOR), or of a projection of GIST (PROJECTION)."""
+
+    about: str
+    view: str
+    size: int
+    seed: int
+
+
+class Result(NamedTuple):
+    """A line of descriptors.csv: what the words of a task do on the tests of a fold; shares of 1, and nats."""
+
+    about: str
+    view: str
+    size: int
+    seed: int
+    set: str
+    fold: int
+    figures: Figures
+
+    @property
+    def task(self) -> Task:
+        """The words that were judged."""
+        return Task(*self[:4])
+
+
+@dataclass(frozen=True)
+class Split:
+    """A fold of a set: its frames by all descriptors that are compared, described once; `work`: where they are kept."""
+
+    data: Path
+    name: str
+    tests: tuple[str, ...]
+    spec: DescriptorSpec = field(repr=False)
+    work: Path
+
+    @cached_property
+    def frames(self) -> Descriptors:
+        """All frames of the set."""
+        return self._described(self.data / self.name, lambda sequence: True)
+
+    @cached_property
+    def testing(self) -> Mask:
+        """Which of the frames test, bool (n,)."""
+        return np.array([self._tests(name) for name in self.frames.sequences], bool)
+
+    @cached_property
+    def lights(self) -> dict[str, Descriptors]:
+        """The frames that test in every simulated light."""
+        lit = {light: relit_set(self.data, self.name, light, self.work) for light in LIGHTS}
+        return {light: self._described(folder, self._tests) for light, folder in lit.items()}
+
+    def sequences(self) -> list[FrameSequence]:
+        """The sequences that test."""
+        return [one for one in find_sequences([self.data / self.name]) if self._tests(one.name)]
+
+    def _tests(self, sequence: str) -> bool:
+        return any(Path(sequence).match(glob) for glob in self.tests)
+
+    def _described(self, folder: Path, wanted: Callable[[str], bool]) -> Descriptors:
+        found = [one for one in find_sequences([folder]) if wanted(one.name)]
+        return describe(found, self.spec, cache=self.work / "cache")
+
+
+def judged(split: Split, dictionary: Dictionary, tests: Mapping[str, Descriptors]) -> dict[str, Evaluation]:
+    """What the filter makes of the words of some tests, by what they are called."""
+    made, training = DictionarySet.of(dictionary), split.frames.take(~split.testing)
+    with tempfile.TemporaryDirectory() as path:
+        folder = ModelFolder(Path(path))
+        learn_models(folder, training.values, training.table, training.spec, made, ModelOptions())
+        decoder = make_decoder(HOHMM, load_model(folder.path))
+        return {
+            name: evaluate([decoder.decode(stream) for stream in tokens_of(frames, made)])
+            for name, frames in tests.items()
+        }
+
+
+def plain_figures(split: Split, dictionary: Dictionary, lights: Mapping[str, Descriptors]) -> Figures:
+    """What a dictionary does on frames as they are, one by one and filtered, and the accuracy in some lights."""
+    own = split.frames.part(dictionary.spec)
+    found = judged(split, dictionary, {"": split.frames.take(split.testing), **lights})
+    plain = found.pop("")
+    return {
+        "frames": plain.frames,
+        "single": float(np.mean(answers(dictionary, own, split.testing))),
+        "accuracy": plain.accuracy,
+        "log_loss": plain.log_loss,
+        **{light: one.accuracy for light, one in found.items()},
+    }
+
+
+def changed_words(split: Split, dictionary: Dictionary, sample: int) -> Figures:
+    """The share of frames that get another word by each of FAULTS and LIGHTS, over all amounts of it."""
+    shares: dict[str, list[float]] = {}
+    for light in (False, True):
+        for one in word_changes(split.sequences(), dictionary, light=light, sample=sample).results:
+            name = one.amount if light else FAULTS.get(one.kind, one.kind)
+            shares.setdefault(f"{name}: words", []).append(one.share)
+    return {name: float(np.mean(shares[name])) for name in WORDS}
+
+
+def figures(split: Split, task: Task) -> Figures:
+    """What the words of a task do: all of FIGURES for a descriptor, those of frames as they are for a projection."""
+    training = split.frames.take(~split.testing)
+    if task.about == PROJECTION:
+        own = training.part(split.spec.part("gist"))
+        return plain_figures(split, learned(own, task.view, DictionaryOptions(task.size, seed=task.seed)), {})
+    options = DictionarySetOptions((task.view,), (task.size,), seed=task.seed)
+    made = DictionarySet.fit(training.values, spec=training.spec, places=training.table.places, options=options)
+    (dictionary,) = made.dictionaries
+    changed = changed_words(split, dictionary, CHANGED // len(FOLDS[split.name]))
+    return plain_figures(split, dictionary, split.lights) | changed
+
+
+def own_figures(split: Split, task: Task) -> dict[str, Figures]:
+    """The figures as they are kept."""
+    return {"": figures(split, task)}
+
+
+def all_tasks(network: Network | None) -> Iterator[Task]:
+    """What is done in every fold."""
+    for view in (*(f"{kind}{of}" for kind in MADE for of in ("", ":pn")), f"{DEFAULT_KIND}:pn"):
+        yield Task(DESCRIPTOR, view, SIZE, 0)
+    for view in () if network is None else ("onnx", "onnx:pn"):
+        yield Task(DESCRIPTOR, view, SIZE, 0)
+    for projection, size, seed in product(PROJECTIONS, SIZES, range(SEEDS)):
+        yield Task(PROJECTION, projection, size, seed)
+
+
+def run(data: Path, sets: Sequence[str], network: Network | None, work: Path) -> Iterator[Result]:
+    """The results of all folds of some sets."""
+    spec = DescriptorSpec(kind="+".join([*MADE, *(() if network is None else ("onnx",))]), network=network)
+    for name in sets:
+        for fold, tests in enumerate(FOLDS[name]):
+            split = Split(data, name, tests, spec, work)
+            for task in all_tasks(network):
+                kinds = View.parse(task.view).kinds if task.about == DESCRIPTOR else ("gist",)
+                key = content_digest(*task, tests, spec.part(*kinds).as_dict())[:16]
+                found = kept(work / name / f"{key}.json", partial(own_figures, split, task))
+                yield Result(*task, name, fold, found[""])
+            sys.stderr.write(f"{name}: fold {fold + 1}\n")
+
+
+def format_results(results: Iterable[Result]) -> str:
+    """The text of descriptors.csv."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow((*Result._fields[:-1], *FIGURES))
+    for one in results:
+        values = [one.figures.get(name, "") for name in FIGURES]
+        writer.writerow([*one[:-1], *(f"{value:.6f}" if isinstance(value, float) else value for value in values)])
+    return text.getvalue()
+
+
+def read_results(path: Path) -> list[Result]:
+    """The lines of descriptors.csv."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return [
+            Result(
+                line["about"],
+                line["view"],
+                int(line["size"]),
+                int(line["seed"]),
+                line["set"],
+                int(line["fold"]),
+                {name: float(line[name]) for name in FIGURES if line[name]},
+            )
+            for line in csv.DictReader(file)
+        ]
+
+
+def of_sets(results: Sequence[Result], figure: str) -> dict[str, float]:
+    """A figure on every set, the mean over folds and seeds with the frames as weights, and the mean over sets."""
+    found = {}
+    for name in FOLDS:
+        own = [one.figures for one in results if one.set == name]
+        if own:
+            found[name] = float(np.average([one[figure] for one in own], weights=[one["frames"] for one in own]))
+    return found | {"mean": float(np.mean([*found.values()]))}
+
+
+def by_set(results: Sequence[Result], about: str) -> Table:
+    """A line for each view and size: single frames, accuracy and log loss on each set, and their means over sets."""
+    lines = []
+    head: list[str] = []
+    for told, own in _grouped(results, about):
+        single, right, loss = (of_sets(own, figure) for figure in ("single", "accuracy", "log_loss"))
+        head = [*single]
+        cells = [f"{100 * single[name]:.1f} / {100 * right[name]:.1f}, {loss[name]:.3f}" for name in head]
+        lines.append((told, *cells))
+    return (about, *head), lines
+
+
+def in_light(results: Sequence[Result]) -> Table:
+    """A line for each view: the mean accuracy over sets as it is and in each light, and the most that a set loses."""
+    lines = []
+    for told, own in _grouped(results, DESCRIPTOR):
+        plain = of_sets(own, "accuracy")
+        cells = [f"{100 * plain['mean']:.1f}"]
+        for light in LIGHTS:
+            lit = of_sets(own, light)
+            cells.append(f"{100 * lit['mean']:.1f} ({100 * min(lit[name] - plain[name] for name in plain):+.1f})")
+        lines.append((told, *cells))
+    return (DESCRIPTOR, "as it is", *LIGHTS), lines
+
+
+def of_words(results: Sequence[Result]) -> Table:
+    """A line for each view: the share of frames that get another word by each fault and light, the mean over sets."""
+    lines = [
+        (told, *(f"{100 * of_sets(own, name)['mean']:.1f}" for name in WORDS))
+        for told, own in _grouped(results, DESCRIPTOR)
+    ]
+    return (DESCRIPTOR, *(name.removesuffix(": words") for name in WORDS)), lines
+
+
+def _grouped(results: Sequence[Result], about: str) -> Iterator[tuple[str, list[Result]]]:
+    """What each view or projection is called, and the results of all folds and seeds."""
+    own = [one for one in results if one.about == about]
+    for view, size in dict.fromkeys((one.view, one.size) for one in own):
+        told = f"`{view}`" if about == DESCRIPTOR else f"{view}, {size} x {size}"
+        yield told, [one for one in own if (one.view, one.size) == (view, size)]
+
+
+def of_cost(costs: Sequence[Mapping[str, Any]]) -> Table:
+    """A line for everything whose cost was measured."""
+    head = [*dict.fromkeys(name for one in costs for name in one)]
+    return head, [[str(one.get(name, "")) for name in head] for one in costs]
+
+
+def tables(results: Sequence[Result], costs: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """What belongs between the marks of the page, by name; "" where there are no results for it yet."""
+    made = {
+        "descriptors": by_set(results, DESCRIPTOR),
+        "descriptors light": in_light(results),
+        "descriptors words": of_words(results),
+        "projections": by_set(results, PROJECTION),
+        "descriptors cost": of_cost(costs),
+    }
+    return {name: markdown(table) if table[1] else "" for name, table in made.items()}
+
+
+def measured_costs(data: Path, network: str | None) -> list[dict[str, Any]]:
+    """What the benchmark finds on frames of a set, in a process of its own."""
+    command = [sys.executable, str(BENCHMARK), "--json", "--frames", str(data / "ietower")]
+    more = ["--network", network] if network else []
+    found = subprocess.run([*command, *more], capture_output=True, text=True, check=True, env=ONE_THREAD)
+    costs: list[dict[str, Any]] = json.loads(found.stdout)
+    return costs
 
 
 if __name__ == "__main__":
-    options = arguments(__doc__)
-    sys.stdout.write(HEAD)
-    for data in options.data:
-        sys.stdout.write(row(data, options.test))
-        sys.stdout.flush()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", metavar="DATA", nargs="?", type=Path, help="the folder of the sets")
+    parser.add_argument("--set", action="append", choices=FOLDS, help="run this one only, and leave page and csv alone")
+    parser.add_argument("--network", metavar="FILE[#LAYER]", help="an image network as one more descriptor")
+    parser.add_argument("--work", metavar="DIR", type=Path, default=Path("descriptors-work"), help="what is kept")
+    options = parser.parse_args()
+    logging.getLogger("placerec").setLevel(logging.ERROR)
+    if options.data:
+        file, _, layer = (options.network or "").partition("#")
+        found = run(options.data, options.set or [*FOLDS], open_network(file, layer) if file else None, options.work)
+        results = format_results(found)
+        if not options.set:
+            COSTS.parent.mkdir(exist_ok=True)
+            write_text(COSTS, json.dumps(measured_costs(options.data, options.network), indent=1) + "\n")
+            write_text(RESULTS, results)
+    if not options.set:
+        made = tables(read_results(RESULTS), json.loads(COSTS.read_text(encoding="utf-8")))
+        write_text(PAGE, filled(PAGE.read_text(encoding="utf-8"), made))

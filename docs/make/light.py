@@ -31,6 +31,14 @@ VIEWS = {"gist, gist:pn": DEFAULT[:2], f"{', '.join(DEFAULT)} (default)": DEFAUL
 SHOWN = ("as it is", *LIGHTS)
 
 
+def relit_set(data: Path, name: str, light: str, work: Path, seed: int = 0) -> Path:
+    """The folder in `work` with a set in another light, which is made if it is not there."""
+    relit = work / "relit" / name / light
+    if not relit.exists():
+        relight([data / name], relit, light, seed=seed)
+    return relit
+
+
 def figures(
     data: Path, name: str, fold: int, views: tuple[str, ...], work: Path, seed: int, network: Network | None
 ) -> dict[str, list[float]]:
@@ -50,9 +58,7 @@ def figures(
     for light in SHOWN if network is None else SHOWN[:1]:
         sources = tests
         if light in LIGHTS:
-            relit = work / "relit" / name / light
-            if not relit.exists():
-                relight([data / name], relit, light, seed=seed)
+            relit = relit_set(data, name, light, work, seed)
             sources = [relit / path.name for path in tests]
         file = None if network is None else network.file
         judged = evaluate(decode(sources, model, out=work / "beliefs", cache=cache, network=file))

@@ -127,7 +127,15 @@ def place_normalised(
         found.places,
         found.shrinkage(),
     )
-    within, axes = exact.eigen(found.shrunk())
+    return whitened(pca, found.shrunk())
+
+
+def whitened(pca: Pca, covariance: Floats) -> Pca:
+    """The projection that makes a covariance (k, k) of the coordinates of `pca` the identity.
+
+    Coordinates come in the order of their variance over all rows, the largest first, and are uncorrelated over these.
+    """
+    within, axes = exact.eigen(covariance)
     white = axes / np.sqrt(within)[:, None]
     # The covariance of all rows is diagonal in the PCA's coordinates, and is to be so again.
     variances, turn = exact.eigen(np.einsum("ik,k,jk->ij", white, pca.variances.astype(np.float64), white))
