@@ -70,7 +70,7 @@ SIZE, SIZES = 20, (10, 20)
 # Maps of each projection, by the seeds 0, 1, ...; descriptors have one map.
 SEEDS = 3
 # Frames of a set that a camera's faults and lights change.
-CHANGED = 100
+CHANGED = 60
 MADE = [kind for kind, one in KINDS.items() if one.describe is not None and kind != "onnx"]
 # What is changed about a frame whose word is looked at, of `placerec stability`, and by which name it is shown.
 FAULTS = {"JPEG": "JPEG", "noise": "noise", "blur": "blur", "shift by 1 pixel": "shift"}
@@ -215,7 +215,7 @@ def run(data: Path, sets: Sequence[str], network: Network | None, work: Path) ->
             split = Split(data, name, tests, spec, work)
             for task in all_tasks(network):
                 kinds = View.parse(task.view).kinds if task.about == DESCRIPTOR else ("gist",)
-                key = content_digest(*task, tests, spec.part(*kinds).as_dict())[:16]
+                key = content_digest(*task, CHANGED, tests, spec.part(*kinds).as_dict())[:16]
                 found = kept(work / name / f"{key}.json", partial(own_figures, split, task))
                 yield Result(*task, name, fold, found[""])
             sys.stderr.write(f"{name}: fold {fold + 1}\n")

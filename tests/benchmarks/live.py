@@ -6,8 +6,13 @@ The frames are synthetic (blurred noise, 640 x 480 in colour): the time does not
 a JPEG of that size to grey levels; a camera's own frames are there already. `fit`: to the 128 x 128 that GIST
 describes. `word`: PCA and the nearest unit. `belief`: five places, order 2. `line`: as `decode` writes it. The stages
 take turns frame by frame in one process; medians over all turns, of CPU time.
+
+Then the default's eight dictionaries (eight places) by `decode --live`: a video of these frames, 25 a second for ten
+seconds, on one processor.
 """
 
+import logging
+import os
 import statistics
 import sys
 import tempfile
@@ -17,18 +22,21 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from dictionaries import make_recognizer as make_default
 from numpy.typing import NDArray
 
 from placerec.frames.image import read_gray
 from placerec.hohmm import Recognizer
+from placerec.methods import decode_live
 from placerec.methods.decode import format_belief
 from placerec.model import load_recognizer, train_lm
-from placerec.vision import Dictionary, DictionaryOptions
+from placerec.vision import DEFAULT_KIND, Dictionary, DictionaryOptions
 from placerec.vision.gist import gist
 from placerec.vision.images import fit_image
 from placerec.vision.spec import DescriptorSpec
 
 FRAMES, PLACES, SIZES = 24, 5, (10, 20, 30)
+RATE, SECONDS = 25, 10
 STAGES = ("picture", "fit", "gist", "word", "belief", "line")
 
 
@@ -85,8 +93,28 @@ def stages(path: Path, dictionary: Dictionary, recognizer: Recognizer) -> list[f
     return [after - before for before, after in pairwise(moments)]
 
 
+def write_video(path: Path, frames: list[Path]) -> None:
+    """The frames over and over, as Motion JPEG."""
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), RATE, (640, 480))
+    for number in range(RATE * SECONDS):
+        video.write(np.asarray(cv2.imread(str(frames[number % len(frames)])), np.uint8))
+    video.release()
+
+
+def live(folder: Path) -> None:
+    """Print what `decode --live` says of a video at its own pace."""
+    dictionaries, _, _ = make_default(folder, DescriptorSpec(kind=DEFAULT_KIND))
+    dictionaries.save(folder / "words.npz")
+    write_video(folder / "run.avi", write_frames(folder))
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    for _ in decode_live(folder / "run.avi", folder / "model", words=folder / "words.npz"):
+        pass
+
+
 def main(turns: int) -> None:
-    """Print a table."""
+    """Print a table, and what came of live decoding."""
     print(f"{'':12}" + "".join(f"{stage:>10}" for stage in STAGES) + f"{'all':>10}")
     for size in SIZES:
         with tempfile.TemporaryDirectory() as name:
@@ -100,6 +128,8 @@ def main(turns: int) -> None:
         medians.append(sum(medians))
         print(f"{size * size:4} words  " + "".join(f"{1e6 * seconds:8.0f}us" for seconds in medians))
         print(f"{'':12}" + "".join(f"{seconds / medians[2]:10.4f}" for seconds in medians), flush=True)
+    with tempfile.TemporaryDirectory() as name:
+        live(Path(name))
 
 
 if __name__ == "__main__":
