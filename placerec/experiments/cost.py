@@ -30,7 +30,7 @@ class FrontEndCost:
 
 
 def front_end_cost(job: WordsJob, tests: Sequence[Descriptors], dictionary: Dictionary | DictionarySet) -> FrontEndCost:
-    """The mean over some test images, one at a time; reading them is not counted.
+    """The median over some test images, one at a time; reading them is not counted.
 
     `tests`: the descriptors of the job's test sequences.
     """
@@ -72,7 +72,8 @@ def _measured(
         described = perf_counter()
         use(row)
         spent.append((described - started, perf_counter() - described))
-    return FrontEndCost(*(1e6 * np.mean(spent, axis=0)).tolist())
+    # Not the mean, which other work on the machine moves.
+    return FrontEndCost(*(1e6 * np.median(spent, axis=0)).tolist())
 
 
 def _spread_images(sequences: Sequence[FrameSequence], found: Sequence[Descriptors], colours: bool) -> Iterator[Image]:

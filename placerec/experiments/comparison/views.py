@@ -1,7 +1,7 @@
 """What methods of descriptors see of a frame: the components of a view, or those of several views side by side.
 
 A view is called what `--views` calls it: `lbp:pn`, `gist+lbp`; without a kind (`plain`, `pn`), of the descriptors that
-the methods of one dictionary have words of. `views` are all those together that `hohmm` has words of.
+the methods of one dictionary have words of. `views` are all those together that `hohmm` may have words of.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -88,8 +88,8 @@ def see(
     """The frames of a job in PLAIN and in the views of these names, each fitted to the training sequences.
 
     `dictionary`: that of the methods of one dictionary, whose projection is PLAIN. `words`: dictionaries that `hohmm`
-    uses as they are, with their projections; None for those of the default views. Raises EvaluationError for a view
-    that the frames do not have, or that their labels do not give.
+    uses as they are, with their projections; None for the default views, among which it chooses. Raises EvaluationError
+    for a view that the frames do not have, or that their labels do not give.
     """
     frames = _Frames(
         job.train[0].spec, tuple(one.load() for one in (*job.train, *job.test)), len(job.train), dictionary
