@@ -82,7 +82,7 @@ def experiment(config: Path, out: Path, jobs: int | None) -> None:
     \b
     [data]
     sequences = ["recordings/*"]  # or tokens = "tokens/{size}-{seed}"
-    test = ["run3*"]  # or split = "leave-one-out", "leave-one-illumination-out"
+    test = ["run3*"]  # or split = "leave-one-out", "leave-one-illumination-out", "light"
     [grid]
     order = [1, 2, 3, 4, 5, 6]
     smoothing = ["witten-bell", "lidstone-backoff"]

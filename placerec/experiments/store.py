@@ -6,6 +6,7 @@ changes, only what depends on it is made again. Each file is there whole or not 
 descriptors/KEY.npz  of one sequence
 words/KEY.npz        a dictionary
 tokens/KEY/          token streams of several sequences
+relit/KEY/NAME/      a sequence in simulated light
 NAME/KEY.json        plain values: results of a grid's cells, times
 models/KEY/          n-gram models of a comparison
 """
@@ -158,9 +159,13 @@ def keep_given(
 
 def _key(sequence: FrameSequence, spec: DescriptorSpec) -> str:
     """A digest of a sequence's images; labels, times and names may change without them."""
+    return key_of("descriptors", spec.as_dict(), *images_of(sequence))
+
+
+def images_of(sequence: FrameSequence) -> list[object]:
+    """What a sequence's images depend on, as parts of a key: how they are read, and digests of the files."""
     how = sequence.recording and repr(sequence.recording)
-    files = [content_digest_of_file(path, ExperimentError) for path in files_of(sequence)]
-    return key_of("descriptors", spec.as_dict(), how, files)
+    return [how, [content_digest_of_file(path, ExperimentError) for path in files_of(sequence)]]
 
 
 def _usable(one: Described) -> bool:

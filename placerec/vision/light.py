@@ -16,6 +16,7 @@ import logging
 import math
 import zlib
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -64,7 +65,7 @@ def relight(
         total = sum(len(one.frames) for one in sequences)
         done = 0
         for sequence in sequences:
-            for kept in _write_sequence(sequence, folder / sequence.name, light, seed):
+            for kept in relight_sequence(sequence, folder / sequence.name, light, seed=seed):
                 written += kept
                 done += 1
                 if progress is not None:
@@ -84,8 +85,12 @@ def _owned(out: Path) -> tuple[str, ...]:
         return ()
 
 
-def _write_sequence(sequence: Sequence, folder: Path, light: str, seed: int) -> Iterator[bool]:
-    """Write a sequence, and yield for every frame whether it could be read."""
+def relight_sequence(sequence: Sequence, folder: Path, light: str, *, seed: int) -> Iterator[bool]:
+    """Write a sequence in another light to a new folder, and yield for every frame whether it could be read.
+
+    `relit_sequence` is what it then is. Raises VisionError for an unknown light.
+    """
+    _check(light)
     labels = []
     (folder / CAMERA).mkdir(parents=True)
     (folder / COLD_LIST_FOLDER).mkdir()
@@ -101,6 +106,13 @@ def _write_sequence(sequence: Sequence, folder: Path, light: str, seed: int) -> 
             labels.append(f"{name} {frame.place}\n")
         yield True
     (folder / COLD_LIST_FOLDER / COLD_LIST).write_text("".join(labels), encoding="utf-8", newline="\n")
+
+
+def relit_sequence(sequence: Sequence, folder: Path) -> Sequence:
+    """What `relight_sequence` wrote of a sequence to the folder: the name, the times and the places are its own."""
+    names = [(frame, _name(frame, number)) for number, frame in enumerate(sequence.frames)]
+    frames = [replace(frame, name=name, path=folder / CAMERA / name) for frame, name in names]
+    return Sequence(sequence.name, [frame for frame in frames if frame.path.exists()], folder)
 
 
 def _name(frame: Frame, number: int) -> str:

@@ -60,6 +60,7 @@ def test_tokens_are_found_by_size_and_seed(tmp_path: Path) -> None:
         ("seeds = 1", "seeds = [0, 1]", "[grid] seeds = [0, 1] cannot be used"),
         ('test = ["run3"]', "", "[data] has neither 'test' nor 'split'; give one"),
         ('test = ["run3"]', 'test = ["run3"]\nsplit = "leave-one-out"', "'test' and 'split', which exclude each other"),
+        ('test = ["run3"]', 'split = "light"', "[data] split = 'light' looks at images, and tokens are given; give"),
         ('test = ["run3"]', 'split = "leave-two-out"', "[data] split = 'leave-two-out' cannot be used; choose leave-"),
         ('tokens = "tokens"', 'tokens = "t"\nsequences = ["a"]', "'sequences' and 'tokens', which exclude each other"),
         ('tokens = "tokens"', 'tokens = "{side}"', "[data] tokens = '{side}' holds {side}; write the folder as in"),

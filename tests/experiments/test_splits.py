@@ -7,12 +7,16 @@ import pytest
 from placerec.errors import ExperimentError
 from placerec.experiments.grid.run import find_images
 from placerec.experiments.grid.splits import (
+    LIGHT,
+    SPLITS,
     Fold,
     cold_saarbruecken_b,
+    in_simulated_light,
     leave_one_illumination_out,
     leave_one_out,
     named_tests,
 )
+from placerec.vision.light import LIGHTS
 
 PART_B = [f"seq{path}_{light}{run}" for path in "34" for light in ("cloudy", "night", "sunny") for run in "123"]
 
@@ -50,6 +54,13 @@ def test_leave_one_illumination_out() -> None:
         leave_one_illumination_out([*PART_B, "run7"])
     with pytest.raises(ExperimentError, match="none is left to train"):
         leave_one_illumination_out(["seq1_night1", "seq1_night2"])
+
+
+def test_every_fold_once_in_each_simulated_light() -> None:
+    folds = in_simulated_light(named_tests(["a", "b", "c"], ["a", "b"]))
+    assert folds == [Fold(f"test-simulated-{light}", ("c",), ("a", "b"), light) for light in LIGHTS]
+    assert [fold.light for fold in in_simulated_light(leave_one_out(["a", "b"]))] == [*LIGHTS, *LIGHTS]
+    assert LIGHT not in SPLITS
 
 
 @pytest.mark.parametrize("prefix", ["", "part_b-", "cold-saarbruecken_part_b_"])

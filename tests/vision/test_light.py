@@ -1,5 +1,6 @@
 """Simulated light: the formulas, what is drawn once for a sequence, and recordings in another light."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -11,7 +12,7 @@ from helpers.typed_commands import done, fails
 from placerec.cli import commands
 from placerec.errors import OutputError, VisionError
 from placerec.frames import find_sequences, read_gray
-from placerec.vision.light import LIGHTS, relight, relit
+from placerec.vision.light import LIGHTS, relight, relight_sequence, relit, relit_sequence
 
 
 def image(seed: int = 0) -> np.ndarray:
@@ -77,6 +78,21 @@ def test_a_recording_in_another_light_keeps_frames_times_and_labels(tmp_path: Pa
     first = after.frames[0].path.read_bytes()
     done("relight", run, "-o", tmp_path / "dim", "--light", "dim")
     assert find_sequences([tmp_path / "dim"])[0].frames[0].path.read_bytes() == first
+
+
+def test_a_relit_sequence_has_the_times_and_places_of_its_frames_whatever_their_files_tell(tmp_path: Path) -> None:
+    run = write_images(tmp_path / "run1", seed=1)
+    (sequence,) = find_sequences([run])
+    sequence.frames[3].path.write_text("no picture")
+    frames = [replace(frame, time=float(k), place=f"place {k}") for k, frame in enumerate(sequence.frames)]
+    sequence = replace(sequence, frames=frames)
+    assert [*relight_sequence(sequence, tmp_path / "warm", "warm", seed=0)] == [k != 3 for k in range(12)]
+    found = relit_sequence(sequence, tmp_path / "warm")
+    assert found.name == "run1"
+    assert [(frame.time, frame.place) for frame in found.frames] == [
+        (frame.time, frame.place) for k, frame in enumerate(frames) if k != 3
+    ]
+    assert all(read_gray(frame.path).shape == (24, 32) for frame in found.frames)
 
 
 def test_what_something_else_wrote_is_not_replaced(tmp_path: Path) -> None:

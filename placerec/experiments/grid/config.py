@@ -4,7 +4,7 @@
 sequences = ["recordings/*"]     # folders of images, relative to this file; or
 tokens = "tokens/{size}-{seed}"  # token streams made before
 test = ["run3*"]                 # names of the test sequences; or
-split = "leave-one-out"          # leave-one-illumination-out, cold-saarbruecken-b
+split = "leave-one-out"          # leave-one-illumination-out, cold-saarbruecken-b, light (perhaps with test)
 
 [grid]
 order = [1, 2, 3, 4, 5, 6]
@@ -29,7 +29,7 @@ from string import Formatter
 from typing import Any
 
 from placerec.errors import ExperimentError, PlacerecError
-from placerec.experiments.grid.splits import SPLITS
+from placerec.experiments.grid.splits import LIGHT, SPLITS
 from placerec.files import read_text
 from placerec.hohmm import PER
 from placerec.hohmm.transitions import Per
@@ -42,7 +42,10 @@ from placerec.words import parse_selection
 
 @dataclass(frozen=True)
 class Config:
-    """An experiment; every name is that of the file. Either `sequences` or `tokens` is empty, and `test` or `split`."""
+    """An experiment; every name is that of the file. Either `sequences` or `tokens` is empty, and `test` or `split`.
+
+    But both are given where the split is LIGHT and not every sequence is to be tested.
+    """
 
     folder: Path  # what relative paths start from
     sequences: tuple[str, ...]
@@ -108,7 +111,7 @@ _TABLES = {
         "sequences": _Key(_text, ()),
         "tokens": _Key(_text, "", many=False),
         "test": _Key(_text, ()),
-        "split": _Key(_choice(*SPLITS), "", many=False),
+        "split": _Key(_choice(*SPLITS, LIGHT), "", many=False),
     },
     "grid": {
         "order": _Key(_whole(1, MAX_ORDER, f"give a whole number from 1 to {MAX_ORDER}")),
@@ -139,6 +142,8 @@ def read_config(path: Path | str) -> Config:
         found = [(key, _value(content, table, key)) for table, keys in _TABLES.items() for key in keys]
         config = Config(path.parent, **dict(found))
         _check_tokens(config)
+        if config.tokens and config.split == LIGHT:
+            raise ExperimentError("[data] split = 'light' looks at images, and tokens are given; give sequences")
     except tomllib.TOMLDecodeError as error:
         raise ExperimentError(f"{path}: is not TOML: {error}; mend that line") from error
     except ExperimentError as error:
@@ -159,7 +164,7 @@ def _check_keys(content: Mapping[str, Any]) -> None:
         if table not in content:
             raise ExperimentError(f"the table [{table}] is missing; it holds {', '.join(_TABLES[table])}")
     for first, second in (("sequences", "tokens"), ("test", "split")):
-        if first in content["data"] and second in content["data"]:
+        if first in content["data"] and second in content["data"] and content["data"][second] != LIGHT:
             raise ExperimentError(f"[data] has {first!r} and {second!r}, which exclude each other; leave one out")
         if first not in content["data"] and second not in content["data"]:
             raise ExperimentError(f"[data] has neither {first!r} nor {second!r}; give one")

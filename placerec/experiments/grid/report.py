@@ -4,6 +4,7 @@ import platform
 import shlex
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from os.path import relpath
@@ -18,7 +19,8 @@ from placerec.experiments.grid.cells import GridCell, GridJob, believe_cell
 from placerec.experiments.grid.claims import CANNOT_TELL, FAILS, HIGH, HOLDS, NOT_TRIED, Claim, Statement, judge
 from placerec.experiments.grid.config import Config
 from placerec.experiments.grid.figure import draw_confusion, draw_figure, draw_strips
-from placerec.experiments.grid.results import LEARNED_CSV, Results, Row, Setting, by_seed
+from placerec.experiments.grid.results import LEARNED_CSV, LearnedRow, Results, Row, Setting, by_seed
+from placerec.experiments.grid.splits import LIGHT
 from placerec.experiments.store import key_of, load, save
 from placerec.figures.pages import Mark, heading, paragraph, picture, preformatted, table
 from placerec.files import content_digest_of_file, read_text, write_text
@@ -35,6 +37,7 @@ _CAPTION = (
     "Mean over seeds, with one standard deviation. Dotted: always the most frequent place. Dashed: naive Bayes. "
     "Dash-dotted, if it is there: placerec learn, whose dictionaries and weights are not the paper's."
 )
+SIMULATED = "Tests are frames in simulated light, as placerec relight makes it; training frames are as they are."
 _PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib")
 _MARKS: Mapping[str, Mark] = {HOLDS: "yes", FAILS: "no", CANNOT_TELL: "open", NOT_TRIED: "none"}
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
@@ -80,6 +83,27 @@ def best_table(results: Results, most: int = 10) -> Table:
         lines.append((*names, _percent(right), f"{100 * np.mean(alone):.1f}", f"{100 * np.mean(majority):.1f}"))
     names_ = ("S", "smoothing", "select", "n", "transition")
     return (*names_, "frames right, %", "each frame alone, %", "most frequent place, %"), lines
+
+
+def light_table(results: Results, lights: Mapping[str, str]) -> Table:
+    """A line per simulated light, given that of each fold: percent right (mean over seeds) and log loss.
+
+    Of the best setting, and of what `placerec learn` makes if it was run.
+    """
+    best, lines = ranked(results)[0], []
+    for light in dict.fromkeys(lights.values()):
+        own = [row for row in results.rows if row.setting == best and lights[row.fold] == light]
+        learned = [row for row in results.learned if lights[row.fold] == light]
+        cells = [_percent(by_seed(own)[best]), _log_loss(own)]
+        if learned:
+            cells += [_percent(replace(results, learned=learned).learned_by_seed()), _log_loss(learned)]
+        lines.append((light, *cells))
+    learned_columns = ("placerec learn: frames right, %", "log loss") if results.learned else ()
+    return ("simulated light", "best of the grid: frames right, %", "log loss", *learned_columns), lines
+
+
+def _log_loss(rows: Sequence[Row | LearnedRow]) -> str:
+    return f"{np.average([row.log_loss for row in rows], weights=[row.frames for row in rows]):.3f}"
 
 
 def _percent(seeds: Sequence[float]) -> str:
@@ -138,8 +162,8 @@ def markdown(table: Table) -> str:
     return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |\n" for row in rows)
 
 
-def format_tables(results: Results) -> str:
-    """The text of tables.md."""
+def format_tables(results: Results, lights: Mapping[str, str]) -> str:
+    """The text of tables.md; `lights`: the simulated light of each fold's tests, where they are not as they are."""
     parts = [
         "# Tables\n",
         "## Labelled images per place and split\n",
@@ -150,6 +174,8 @@ def format_tables(results: Results) -> str:
         "## The best of the grid\n",
         markdown(best_table(results)),
     ]
+    if lights:
+        parts += ["## In each light\n", f"{SIMULATED}\n", markdown(light_table(results, lights))]
     return "\n".join(parts)
 
 
@@ -187,9 +213,11 @@ def _contents(out: Path) -> dict[str, str]:
 
 
 def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob], out: Path) -> None:
+    lights = {job.fold.name: job.fold.light for job in jobs if job.fold.light}
     note = reading(len({name for row in results.rows for name in row.sequences}), plan.seeds)
+    note += f" {SIMULATED}" * bool(lights)
     claims = {transition: judge(results, transition) for transition in plan.transition}
-    write_text(out / "tables.md", format_tables(results))
+    write_text(out / "tables.md", format_tables(results, lights))
     write_text(out / "claims.md", format_claims(claims, note))
     best = ranked(results)[0]
     body = [
@@ -197,6 +225,7 @@ def _write(results: Results, plan: Config, config: Path, jobs: Sequence[GridJob]
         heading("Frames right"),
         *_figures(results, plan, out),
         table(*best_table(results), _best_caption(results)),
+        *([table(*light_table(results, lights), SIMULATED)] if lights else []),
         heading("The paper's claims"),
         table(*verdicts_table(claims), "Verdicts; the numbers are below.", marks=_MARKS),
         paragraph(note),
@@ -236,7 +265,8 @@ def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
     for old in out.glob("figure-*"):
         old.unlink()
     for number, transition in enumerate(plan.transition):
-        rows, title = [row for row in results.rows if row.transition == transition], f"{transition} transitions"
+        rows = [row for row in results.rows if row.transition == transition]
+        title = f"{transition} transitions" + ", simulated light" * (plan.split == LIGHT)
         path = out / f"figure{f'-{transition}' if number else ''}.svg"
         draw = partial(draw_figure, rows, plan, title=title, learned=results.learned_by_seed())
         draw(path)
@@ -250,11 +280,13 @@ def _figures(results: Results, plan: Config, out: Path) -> Iterator[str]:
 def _what(results: Results, plan: Config, config: Path) -> str:
     frames = {name: sum(fold["test"].values()) for name, fold in results.folds.items()}
     source = f"the token streams {plan.tokens}" if plan.tokens else f"the images of {', '.join(plan.sequences)}"
-    split = plan.split or f"tests are {', '.join(plan.test)}"
+    split = ": ".join(filter(None, (plan.split, f"tests are {', '.join(plan.test)}" if plan.test else "")))
     return (
         f"{len(results.rows)} results of {config.name} on {source} ({split}): {len(frames)} fold"
         f"{'s' * (len(frames) != 1)}, {sum(frames.values())} labelled test frames, {plan.seeds} "
         f"seed{'s' * (plan.seeds != 1)}. All rows are in results.csv, those of each test sequence in sequences.csv."
+        + f" {SIMULATED}"
+        * (plan.split == LIGHT)
     )
 
 
@@ -264,9 +296,18 @@ def _of(jobs: Sequence[GridJob], setting: Setting) -> list[GridJob]:
 
 
 def _beliefs(jobs: Sequence[GridJob], setting: Setting) -> list[Beliefs]:
-    """The beliefs of a setting with seed 0 over the test sequences of all folds."""
+    """The beliefs of a setting with seed 0 over the test sequences of all folds, by their names there (`_told`)."""
     cell = GridCell(setting.smoothing, setting.order, setting.transition)
-    return [one for job in _of(jobs, setting) for one in believe_cell(job.work, cell)]
+    return [
+        replace(one, stream=replace(one.stream, name=_told(job, one.name)))
+        for job in _of(jobs, setting)
+        for one in believe_cell(job.work, cell)
+    ]
+
+
+def _told(job: GridJob, sequence: str) -> str:
+    """The name of a test sequence, and the light that it is seen in."""
+    return f"{sequence}, simulated: {job.fold.light}" if job.fold.light else sequence
 
 
 def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
@@ -276,7 +317,9 @@ def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
     of = {setting: _beliefs(jobs, setting) for setting in dict.fromkeys((best, first))}
     found = {setting: evaluate(beliefs) for setting, beliefs in of.items()}
     drives = drives_of({str(setting): beliefs for setting, beliefs in of.items()})
-    tests = [one.sequence for job in _of(jobs, best) if job.images for one in job.images.test]
+    tests = {
+        _told(job, one.sequence.name): one.sequence for job in _of(jobs, best) if job.images for one in job.images.test
+    }
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         yield heading("Belief over time")
@@ -284,21 +327,21 @@ def _closer_look(results: Results, jobs: Sequence[GridJob]) -> Iterator[str]:
         caption = f"The sequences with the most and the fewest frames right: {best}, seed 0."
         strips = folder / "strips.png"
         draw_strips(of[best], found[best], strips, 11)
-        yield explorer(drives, shown_of(drives, {one.name: one for one in tests}, None))
+        yield explorer(drives, shown_of(drives, tests, None))
         yield f'<div class="still">{picture(strips, "Beliefs of two test sequences", caption)}</div>'
         yield heading("What is confused")
         for number, (setting, evaluation) in enumerate(found.items()):
             path = folder / f"confusion{number}.png"
             draw_confusion(evaluation, path)
             yield picture(path, "Confusion matrix", f"{setting}, seed 0, all folds.")
-        images = _of(jobs, best)[0].images
-        if images is not None:
+        job = _of(jobs, best)[0]
+        if (images := job.images) is not None:
             yield heading("The words")
             sequences = [one.sequence for one in images.test]
             words = word_table(Descriptors.concat([one.load() for one in images.test]), Dictionary.load(images.words))
             title = f"The words of S = {best.size}, seed 0, among the test frames"
             draw_word_sheet(words, typical_images(words, sequences), folder / "words.png", title=title)
-            caption = f"The words of S = {best.size}, seed 0, among the test frames of the first fold."
+            caption = f"{title} of the first fold ({job.fold.name})."
             yield picture(folder / "words.png", "For each word a typical frame", caption)
 
 

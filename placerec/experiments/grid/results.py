@@ -232,12 +232,15 @@ def scores(rows: Sequence[Row], *, draws: int = DRAWS) -> Scores:
     place = [{value: i for i, value in enumerate(axis)} for axis in axes]
     number = {name: i for i, name in enumerate(names)}
     frames, majority = np.zeros(len(names)), np.zeros(len(names))
+    # A sequence may be tested in several folds, in several lights.
+    for name, one in {(row.fold, name): (name, one) for row in rows for name, one in row.sequences.items()}.values():
+        frames[number[name]] += one.frames
+        majority[number[name]] += one.majority
     seeds = len({row.seed for row in rows})
     for row in rows:
         cell = tuple(of[getattr(row, name)] for of, name in zip(place, AXES, strict=True))
         for name, one in row.sequences.items():
             right[(*cell, number[name])] += one.right / seeds
-            frames[number[name]], majority[number[name]] = one.frames, one.majority
     # Each sequence once, and then as often as a fixed seed draws it.
     weights = np.concatenate([np.ones((1, len(names))), draw(len(names), 0, draws)])
     whole = weights @ frames

@@ -14,10 +14,11 @@ from placerec.errors import ExperimentError
 from placerec.experiments.grid.cells import KEPT, CellJob, GridCell, GridJob, run_cells
 from placerec.experiments.grid.config import Config, read_config
 from placerec.experiments.grid.learned import SPEC as LEARNED_SPEC, learn_folds
+from placerec.experiments.grid.relit import RelitJob, relight_kept
 from placerec.experiments.grid.report import write_reports
 from placerec.experiments.grid.results import COLUMNS, Results, Row, SequenceCount, write_learned, write_results
-from placerec.experiments.grid.splits import SPLITS, Fold, named_tests
-from placerec.experiments.store import WordsJob, describe_all, held_output, key_of, make_tokens
+from placerec.experiments.grid.splits import LIGHT, SPLITS, Fold, in_simulated_light, leave_one_out, named_tests
+from placerec.experiments.store import Described, WordsJob, describe_all, held_output, key_of, make_tokens
 from placerec.figures.canvas import check_figure
 from placerec.files import content_digest_of_file
 from placerec.frames import Sequence as FrameSequence, find_sequences
@@ -71,14 +72,12 @@ def run_grid(
 def _image_jobs(plan: Config, out: Path, jobs: int, progress: ProgressBar) -> Iterator[GridJob]:
     sequences = find_images(plan.sequences, plan.folder)
     folds = _folds(plan, [sequence.name for sequence in sequences])
-    with progress("describe") as show:
-        # What `placerec learn` sees of a frame holds what the paper's cells do.
-        wide = SPEC if plan.as_in_paper else LEARNED_SPEC
-        described = describe_all(sequences, wide, out / "cache", together=1, work=workers(jobs), progress=show)
-    of = {one.sequence.name: one.part(SPEC) for one in described}
+    # What `placerec learn` sees of a frame holds what the paper's cells do.
+    wide = SPEC if plan.as_in_paper else LEARNED_SPEC
+    of = {key: one.part(SPEC) for key, one in _describe(sequences, folds, wide, out / "cache", jobs, progress).items()}
     todo = {}
     for size, seed, fold in product(plan.size, range(plan.seeds), folds):
-        train, test = (tuple(of[name] for name in names) for names in (fold.train, fold.test))
+        train, test = tuple(of["", name] for name in fold.train), tuple(of[fold.light, name] for name in fold.test)
         options = DictionaryOptions(size=size, seed=seed, units=plan.units)
         todo[size, seed, fold.name] = WordsJob(train, test, options, out / "cache")
     missing = [job for job in todo.values() if not job.made]
@@ -87,6 +86,26 @@ def _image_jobs(plan: Config, out: Path, jobs: int, progress: ProgressBar) -> It
     for fold, size, seed in product(folds, plan.size, range(plan.seeds)):
         images = todo[size, seed, fold.name]
         yield from _jobs(plan, size, seed, fold, images.folder, out, images)
+
+
+def _describe(
+    sequences: Sequence[FrameSequence],
+    folds: Sequence[Fold],
+    spec: DescriptorSpec,
+    cache: Path,
+    jobs: int,
+    progress: ProgressBar,
+) -> dict[tuple[str, str], Described]:
+    """The sequences by light and name, described: all of them as they are (""), and in the lights of the tests."""
+    names = {one.name: one for one in sequences}
+    relit = list(dict.fromkeys((fold.light, name) for fold in folds if fold.light for name in fold.test))
+    with progress("relight") as show:
+        todo = [RelitJob(names[name], light, cache) for light, name in relit]
+        tests = map_jobs(relight_kept, todo, jobs=jobs, progress=show)
+    with progress("describe") as show:
+        # One at a time, for a sequence and its copies have one name.
+        described = describe_all([*sequences, *tests], spec, cache, together=1, work=workers(jobs), progress=show)
+    return dict(zip([*(("", name) for name in names), *relit], described, strict=True))
 
 
 def _token_jobs(plan: Config, out: Path) -> Iterator[GridJob]:
@@ -98,7 +117,11 @@ def _token_jobs(plan: Config, out: Path) -> Iterator[GridJob]:
 
 
 def _folds(plan: Config, names: Sequence[str]) -> list[Fold]:
-    return SPLITS[plan.split](names) if plan.split else named_tests(names, plan.test)
+    if plan.test:
+        folds = named_tests(names, plan.test)
+    else:
+        folds = leave_one_out(names) if plan.split == LIGHT else SPLITS[plan.split](names)
+    return in_simulated_light(folds) if plan.split == LIGHT else folds
 
 
 def _jobs(

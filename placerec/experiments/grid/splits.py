@@ -2,10 +2,11 @@
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from placerec.errors import ExperimentError
+from placerec.vision.light import LIGHTS
 
 # As find_sequences names them: the folder's name, perhaps behind its parent's.
 _COLD = re.compile(r"(?:.*[-_])?seq([1-4])_(cloudy|night|sunny)([0-9]+)")
@@ -19,11 +20,15 @@ _RUNS = ("1", "2", "3")
 
 @dataclass(frozen=True)
 class Fold:
-    """One way to divide the sequences, whose names are given in their order."""
+    """One way to divide the sequences, whose names are given in their order.
+
+    `light`: the simulated light in which those of `test` are, one of `vision.light.LIGHTS`; "" as they are.
+    """
 
     name: str
     train: tuple[str, ...]
     test: tuple[str, ...]
+    light: str = ""
 
 
 def named_tests(names: Sequence[str], globs: Sequence[str]) -> list[Fold]:
@@ -79,6 +84,13 @@ def cold_saarbruecken_b(names: Sequence[str]) -> list[Fold]:
     return [_fold("test", runs, [name for name in runs if parts[name][3] == _RUNS[-1]])]
 
 
+def in_simulated_light(folds: Sequence[Fold]) -> list[Fold]:
+    """Each fold once for every light of `vision.light.LIGHTS`, in which its tests are."""
+    return [replace(fold, name=f"{fold.name}-simulated-{light}", light=light) for fold in folds for light in LIGHTS]
+
+
+# What `[data] split` calls `in_simulated_light`; SPLITS have the frames as they are.
+LIGHT = "light"
 SPLITS: dict[str, Callable[[Sequence[str]], list[Fold]]] = {
     "leave-one-out": leave_one_out,
     "leave-one-illumination-out": leave_one_illumination_out,
