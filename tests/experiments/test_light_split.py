@@ -25,7 +25,7 @@ from placerec.frames import Sequence
 from placerec.methods import decode
 from placerec.model import Decoding, ModelOptions, train_lm
 from placerec.vision import DictionaryOptions, train_dictionary
-from placerec.vision.light import LIGHTS, relight
+from placerec.vision.light import LIGHTS, relight, relight_sequence
 from placerec.words.tokenize import tokenize
 
 CONFIG = """
@@ -125,11 +125,10 @@ def test_what_is_kept_is_not_relit_again(world: World, tmp_path: Path, monkeypat
     root, results = world
     shutil.copytree(root / "out", tmp_path / "out")
     written: list[str] = []
-    real = relit.relight_sequence
 
     def write(sequence: Sequence, folder: Path, light: str, *, seed: int) -> Iterator[bool]:
         written.append(light)
-        return real(sequence, folder, light, seed=seed)
+        return relight_sequence(sequence, folder, light, seed=seed)
 
     monkeypatch.setattr(relit, "relight_sequence", write)
     _, again = run_grid(read_config(root / "grid.toml"), tmp_path / "out")
