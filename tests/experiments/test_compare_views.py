@@ -48,7 +48,7 @@ def default_views(job: WordsJob) -> DictionarySet:
 
 def test_names_of_the_default_are_views_of_methods_of_descriptors() -> None:
     marked = [name for name in DEFAULT if method_of(name).view != PLAIN]
-    assert {"torralba2003@pn-tuned", "knn@pn", "rbf-svm@views", "rbf-svm-hmm@views-tuned"} < {*marked}
+    assert {"torralba2003@pn-tuned", "knn@pn", "logistic@views", "ullah2008-hmm@views-tuned"} < {*marked}
     assert {method_of(name).kind for name in marked} == {DESCRIPTORS}
     assert {method_of(name).view for name in marked} == {"pn", ALL}
     assert method_of("rbf-svm-hmm@gist+lbp:pn-tuned").view == "gist+lbp:pn"

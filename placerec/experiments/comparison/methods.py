@@ -208,10 +208,10 @@ def _on(view: str) -> list[str]:
     return ["@".join(filter(None, (name, "-".join(filter(None, (seen, tuned)))))) for name, tuned in forms]
 
 
-# What is compared where no methods are named: the strongest also on all that `hohmm` sees.
+# What is compared where no methods are named: linear machines, which cost little, also on all that `hohmm` sees.
 DEFAULT: tuple[str, ...] = (
     *(*OF_WORDS, *_on(PLAIN), *_on(NORMALISED)),
-    *(f"rbf-svm@{ALL}", f"rbf-svm-hmm@{ALL}-tuned"),
+    *(f"{name}{mark}" for name in ("ullah2008", "logistic") for mark in (f"@{ALL}", f"-hmm@{ALL}-tuned")),
 )
 # What a message says of the names.
 CHOICES = (
