@@ -18,8 +18,8 @@ from placerec.arrays import Floats, Ints, Mask, Numbers
 from placerec.errors import LanguageModelError, at, refuse_string
 from placerec.files import all_lines
 from placerec.lm.row_index import RowIndex
-from placerec.lm.stored_text import BLOCK, Block, StoredText, changes, distinct_windows
-from placerec.lm.trie import Trie, closed_trie, per_context
+from placerec.lm.stored_text import BLOCK, Block, StoredText, distinct_windows
+from placerec.lm.trie import Trie, changes, closed_trie, per_context
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START, UNKNOWN, Vocabulary, add_markers, find_markers
 
 if TYPE_CHECKING:

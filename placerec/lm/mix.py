@@ -13,6 +13,9 @@ from placerec.lm.logs import LN10, log10, log10_of_sum, p_of
 from placerec.lm.mutable import SILENT, MutableModel, Trace, reweigh
 from placerec.lm.trie import runs
 
+# Rows that are mixed at once: what is computed on the way stays in the processor's cache.
+_PART = 1 << 15
+
 
 def merge_weight(weights: Sequence[float], k: int) -> float:
     """The weight of what was merged so far when component k >= 1 joins it."""
@@ -22,15 +25,23 @@ def merge_weight(weights: Sequence[float], k: int) -> float:
 
 def merge(model: MutableModel, other: MutableModel, weight: float, trace: Trace = SILENT) -> None:
     """Section 11.4: mix `other`, over the same trie, into `model`, whose share is `weight`."""
-    mixed = [_mean([model.backed_off(n), other.backed_off(n)], [weight, 1 - weight]) for n in range(1, model.order + 1)]
+    mixed = [_mixed_order(model, other, n, weight) for n in range(1, model.order + 1)]
     for n in range(model.order, 0, -1):
         new = np.flatnonzero(other.stored[n - 1] & ~model.stored[n - 1])
         model.stored[n - 1][new] = True
         if n > 1:
             model.add_contexts(n - 1, runs(model.trie.prefix(n)[new])[0])
-        stored = model.stored[n - 1]
-        model.log10_p[n - 1][stored] = mixed[n - 1][stored]
+        np.copyto(model.log10_p[n - 1], mixed[n - 1], where=model.stored[n - 1])
     reweigh(model, trace)
+
+
+def _mixed_order(model: MutableModel, other: MutableModel, n: int, weight: float) -> Singles:
+    """log10 p float32 (m_n,) of the rows of order n in the mixture."""
+    mixed = np.empty(len(model.base[n - 1]), np.float32)
+    for start in range(0, len(mixed), _PART):
+        part = slice(start, start + _PART)
+        mixed[part] = _mean([model.backed_off(n, part), other.backed_off(n, part)], [weight, 1 - weight])
+    return mixed
 
 
 def mixed(log10_probs: Singles, weights: Floats) -> Singles:

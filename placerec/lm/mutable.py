@@ -99,6 +99,7 @@ class Trace:
 
 
 SILENT = Trace()
+_NO_VALUES = np.zeros(0, np.float32)
 
 
 @dataclass
@@ -127,10 +128,11 @@ class MutableModel:
         for keys in self.trie.keys:
             for mask in (self.stored, self.is_context):
                 mask.append(np.zeros(len(keys), bool))
-            for column in (self.log10_p, self.base):
-                column.append(np.full(len(keys), -np.inf, np.float32))
-            for column in (self.backoff, self.weight):
-                column.append(np.zeros(len(keys), np.float32))
+            self.log10_p.append(np.full(len(keys), -np.inf, np.float32))
+            self.backoff.append(np.zeros(len(keys), np.float32))
+        # There once they are refreshed.
+        self.base = [_NO_VALUES] * self.order
+        self.weight = [_NO_VALUES] * self.order
 
     @property
     def order(self) -> int:
@@ -141,19 +143,29 @@ class MutableModel:
         """How many names the words that get a probability have: SRILM takes each for a word where it counts words."""
         return int(self.alias_counts[self.predictable].sum())
 
-    def backed_off(self, n: int) -> Singles:
-        """log10 p float32 (m_n,) of every row of order n; `refresh` first."""
-        return self.base[n - 1] + self.weight[n - 1]
+    def backed_off(self, n: int, part: slice = slice(None)) -> Singles:
+        """log10 p float32 (m_n,) of every row of order n, or of a part of the rows; `refresh` first."""
+        return self.base[n - 1][part] + self.weight[n - 1][part]
 
     def refresh(self, n: int) -> None:
         """Bring the backed-off values of order n up to date with what is stored; shorter orders must be."""
         if n == 1:
-            self.base[0] = self.log10_p[0]
+            self.base[0], self.weight[0] = self.log10_p[0], np.zeros(len(self.log10_p[0]), np.float32)
             return
-        stored, shorter, context = self.stored[n - 1], self.trie.suffixes[n - 1], self.trie.prefix(n)
-        paid = np.where(self.is_context[n - 2], self.backoff[n - 2], np.float32(0))[context]
-        self.base[n - 1] = np.where(stored, self.log10_p[n - 1], self.base[n - 2][shorter])
-        self.weight[n - 1] = np.where(stored, np.float32(0), self.weight[n - 2][shorter] + paid)
+        base = self.log10_p[n - 1].copy()
+        weight = np.zeros(len(base), np.float32)
+        rows = np.flatnonzero(~self.stored[n - 1])
+        if len(rows):
+            shorter, context = self.trie.suffixes[n - 1][rows], self.trie.prefix(n)[rows]
+            paid = np.where(self.is_context[n - 2][context], self.backoff[n - 2][context], np.float32(0))
+            base[rows] = self.base[n - 2][shorter]
+            weight[rows] = self.weight[n - 2][shorter] + paid
+        self.base[n - 1], self.weight[n - 1] = base, weight
+
+    def refresh_shorter(self) -> None:
+        """Bring the backed-off values of all orders but the highest up to date."""
+        for n in range(1, self.order):
+            self.refresh(n)
 
     def refresh_all(self) -> None:
         """Bring all backed-off values up to date."""
@@ -321,7 +333,11 @@ def insert_prefixes(model: MutableModel, trace: Trace) -> None:
 
 
 def reweigh(model: MutableModel, trace: Trace, *, minimum: float | None = None) -> None:
-    """Recompute all backoff weights, and spread what the unigrams leave (`-renorm`, section 11.1)."""
+    """Recompute all backoff weights, and spread what the unigrams leave (`-renorm`, section 11.1).
+
+    The backed-off values of the highest order, which no weight depends on, are not refreshed.
+    """
     for n in range(1, model.order + 1):
         weigh_contexts(model, n, trace, minimum=minimum)
-        model.refresh(n)
+        if n < model.order:
+            model.refresh(n)

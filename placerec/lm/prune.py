@@ -10,6 +10,9 @@ from placerec.lm.logs import LN10, p_of
 from placerec.lm.mutable import SILENT, MutableModel, Trace, insert_prefixes, reweigh, settle_masses
 from placerec.lm.vocabulary import SENTENCE_END, SENTENCE_START
 
+# Rows that are tried at once: what is computed on the way stays in the processor's cache.
+_PART = 1 << 15
+
 
 def prune(
     model: MutableModel,
@@ -23,7 +26,7 @@ def prune(
 
     `history`: a model over the same trie that says how probable contexts are (default: the model itself).
     """
-    model.refresh_all()
+    model.refresh_shorter()
     for n in range(model.order, max(2, shortest) - 1, -1):
         _prune_order(model, n, threshold, history or model, trace)
     reweigh(model, trace)
@@ -34,24 +37,29 @@ def _prune_order(model: MutableModel, n: int, threshold: float, history: Mutable
     rows = np.flatnonzero(model.stored[n - 1])
     group = model.context_places(n - 1)[model.trie.prefix(n)[rows]]
     num, den, overfull = settle_masses(model, n, rows, group, contexts, None, trace)
-    tried = ~overfull[group]
-    rows, group = rows[tried], group[tried]
+    if overfull.any():
+        tried = ~overfull[group]
+        rows, group = rows[tried], group[tried]
     vocabulary = model.trie.vocabulary.index
     start, end = vocabulary.get(SENTENCE_START, -1), vocabulary.get(SENTENCE_END, -1)
-    context = joint_log10_p(history, n - 1, start=start, end=end)[contexts][group]
-    old = model.log10_p[n - 1][rows]
-    shorter = model.backed_off(n - 1)[model.trie.suffixes[n - 1][rows]]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        weight = (np.log10(num[group] + p_of(old)) - np.log10(den[group] + p_of(shorter))).astype(np.float32)
-        new = shorter + weight
-        change = (new - old).astype(np.float64)
-        left = num[group] * (weight - model.backoff[n - 2][contexts][group]).astype(np.float64)
-        entropy = -p_of(context) * (p_of(old) * change + left)
-        gone = (np.exp(entropy * LN10) - 1 < threshold) & ~model.is_context[n - 1][rows]
-    trace.trials(n, rows, context, old, new, entropy, gone)
+    joint = joint_log10_p(history, n - 1, start=start, end=end)[contexts]
+    weights = model.backoff[n - 2][contexts]
+    shorter = model.backed_off(n - 1)
+    gone = np.empty(len(rows), bool)
+    for first in range(0, len(rows), _PART):
+        row, its = rows[first : first + _PART], group[first : first + _PART]
+        context, old = joint[its], model.log10_p[n - 1][row]
+        less = shorter[model.trie.suffixes[n - 1][row]]
+        p_old, left, lost = p_of(old), num[its], den[its]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            weight = (np.log10(left + p_old) - np.log10(lost + p_of(less))).astype(np.float32)
+            new = less + weight
+            change = (new - old).astype(np.float64)
+            entropy = -p_of(context) * (p_old * change + left * (weight - weights[its]).astype(np.float64))
+            gone[first : first + _PART] = (np.exp(entropy * LN10) - 1 < threshold) & ~model.is_context[n - 1][row]
+        trace.trials(n, row, context, old, new, entropy, gone[first : first + _PART])
     model.stored[n - 1][rows[gone]] = False
     _forget_contexts(model, n, contexts[~overfull])
-    model.refresh(n)
     trace.pruned(n, rows[gone])
 
 
@@ -74,8 +82,8 @@ def joint_log10_p(model: MutableModel, n: int, *, start: int, end: int) -> Singl
 def _forget_contexts(model: MutableModel, n: int, contexts: Ints) -> None:
     """Contexts of order n-1 that have no n-grams left, and no longer contexts, are none any more."""
     used = np.zeros(len(model.is_context[n - 2]), bool)
-    used[model.trie.prefix(n)[model.stored[n - 1]]] = True
-    used[model.trie.suffixes[n - 1][model.is_context[n - 1]]] = True
+    used[model.trie.prefix(n)[np.flatnonzero(model.stored[n - 1])]] = True
+    used[model.trie.suffixes[n - 1][np.flatnonzero(model.is_context[n - 1])]] = True
     empty = contexts[~used[contexts]]
     model.is_context[n - 2][empty] = False
     model.backoff[n - 2][empty] = 0
@@ -86,7 +94,7 @@ def prune_improbable(model: MutableModel, *, shortest: int = 2, trace: Trace = S
 
     Weights are recomputed after each round, the last one, too; contexts that lost their line get it back at the end.
     """
-    model.refresh_all()
+    model.refresh_shorter()
     removed = True
     while removed:
         removed = _improbable_round(model, shortest, trace)
@@ -106,7 +114,8 @@ def _improbable_round(model: MutableModel, shortest: int, trace: Trace) -> bool:
         trace.improbable(n, gone, model.log10_p[n - 1][gone], backed_off[less])
         model.stored[n - 1][gone] = False
         _forget_contexts(model, n, np.flatnonzero(model.is_context[n - 2]))
-        model.refresh(n)
+        if n < model.order:
+            model.refresh(n)
         trace.pruned(n, gone)
         removed |= len(gone) > 0
     return removed

@@ -18,8 +18,9 @@ from typing import Any, cast
 import numpy as np
 
 from placerec.ahead import work_ahead
-from placerec.arrays import Ints, Mask, Numbers
+from placerec.arrays import Ints, Numbers
 from placerec.errors import OutputError
+from placerec.lm.trie import changes
 
 # Words in a block: sorting what fits in a cache is faster.
 BLOCK = 1 << 18
@@ -204,10 +205,3 @@ def _packed(symbols: Ints, lengths: Ints, span: range, bits: int) -> Ints:
         keep = ~sum(((1 << bits) - 1) << shift for shift in shifts)
         packed[at] &= keep
     return packed
-
-
-def changes(values: Ints) -> Mask:
-    """Where a value differs from the one before, bool (m,); the first one does."""
-    changed = np.ones(len(values), bool)
-    np.not_equal(values[1:], values[:-1], out=changed[1:])
-    return changed

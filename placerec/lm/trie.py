@@ -19,17 +19,21 @@ from placerec.lm.vocabulary import Vocabulary
 _NO_ROWS = np.zeros(0, np.int64)
 # Rows that are looked up at once: what is computed on the way stays in the processor's cache.
 _PART = 1 << 15
+# Of a number >= 0.
+_BITS = 63
 
 
 @dataclass(frozen=True)
 class Trie:
     """The n-grams of orders 1..N over `vocabulary`.
 
-    `keys[n-1]`, int64 (m_n,), ascending: prefix row times V plus last word. `keys[0]` is 0..V-1.
+    `keys[n-1]`, int64 (m_n,), ascending: prefix row times V plus last word. `keys[0]` is 0..V-1. `known_suffixes`: the
+    `suffixes`, from whoever makes the trie and has them.
     """
 
     vocabulary: Vocabulary
     keys: tuple[Ints, ...] = field(repr=False)
+    known_suffixes: tuple[Ints, ...] | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return f"Trie({self.sizes})"
@@ -68,20 +72,13 @@ class Trie:
 
         Order 1 has zeros.
         """
-        found = [np.zeros(len(self.vocabulary), np.int64)]
+        if self.known_suffixes is not None:
+            return self.known_suffixes
+        size, found = len(self.vocabulary), [np.zeros(len(self.vocabulary), np.int64)]
         for n in range(2, self.order + 1):
-            found.append(self.word(n) if n == 2 else self._without_first(n, found[n - 2]))
+            index = RowIndex(self.keys[n - 2]) if n > 2 else None
+            found.append(_without_first(self.keys[n - 1], size, index, found[-1]))
         return tuple(found)
-
-    def _without_first(self, n: int, shorter: Ints) -> Ints:
-        """The `suffixes` of order n; `shorter` are those of order n-1."""
-        index, size = RowIndex(self.keys[n - 2]), len(self.vocabulary)
-        rows = np.empty(len(self.keys[n - 1]), np.int64)
-        for start in range(0, len(rows), _PART):
-            keys = self.keys[n - 1][start : start + _PART]
-            ending = shorter[keys // size]
-            rows[start : start + _PART] = index.find(np.where(ending >= 0, ending * size + keys % size, -1))
-        return rows
 
     @property
     def closed(self) -> bool:
@@ -141,9 +138,8 @@ class Trie:
 
 def runs(values: Ints) -> tuple[Ints, Ints]:
     """The distinct values of an ascending array int64 (m,), and for each entry which of them it is, int64 (m,)."""
-    new = np.ones(len(values), bool)
-    new[1:] = values[1:] != values[:-1]
-    return values[new], np.cumsum(new) - 1
+    new = changes(values)
+    return values[np.flatnonzero(new)], np.cumsum(new) - 1
 
 
 def distinct(keys: Sequence[Ints]) -> Ints:
@@ -156,28 +152,98 @@ def per_context(prefix: Ints, size: int, values: Numbers | None = None) -> Float
     return np.bincount(prefix, weights=values, minlength=size).astype(np.float64)
 
 
+def changes(values: Ints) -> Mask:
+    """Where a value differs from the one before, bool (m,); the first one does."""
+    changed = np.ones(len(values), bool)
+    np.not_equal(values[1:], values[:-1], out=changed[1:])
+    return changed
+
+
+def _without_first(keys: Ints, size: int, index: RowIndex | None, shorter: Ints) -> Ints:
+    """The `suffixes` (m,) of one order, of which these are the keys (m,); `shorter` are those of the order below.
+
+    `size`: V. `index`: of the keys of the order below; None if that is order 1.
+    """
+    if index is None:
+        return keys % size
+    rows = np.empty(len(keys), np.int64)
+    for start in range(0, len(rows), _PART):
+        its = keys[start : start + _PART]
+        prefix = its // size
+        ending = shorter[prefix]
+        wanted = (ending - prefix) * size + its
+        wanted[ending < 0] = -1
+        rows[start : start + _PART] = index.find(wanted)
+    return rows
+
+
 def build_trie(vocabulary: Vocabulary, order: int, ngrams: Sequence[Numbers]) -> tuple[Trie, list[list[Numbers]]]:
     """The trie of n-grams, each group a matrix of word numbers, integers (m, n), n <= order, and of all their prefixes.
 
-    Also the rows, integers (m,), of every group's n-grams' prefixes: of length 1, 2, ..., n.
+    Also the rows, integers (m,), of every group's n-grams' prefixes: of length 1, 2, ..., n. It takes least time where
+    n-grams of one context stand side by side.
     """
-    keys = [np.arange(len(vocabulary))]
+    size, keys, index = len(vocabulary), [np.arange(len(vocabulary))], None
+    suffixes = [np.zeros(size, np.int64)]
     rows = [[matrix[:, 0]] for matrix in ngrams]
+    heads = [_heads(matrix) for matrix in ngrams]
     for n in range(2, order + 1):
-        wide = [i for i, matrix in enumerate(ngrams) if matrix.shape[1] >= n]
-        wanted = [rows[i][-1].astype(np.int64) * len(vocabulary) + ngrams[i][:, n - 1] for i in wide]
-        # Mostly every prefix is an n-gram of its own: then there is less to sort.
-        listed = distinct([key for i, key in zip(wide, wanted, strict=True) if ngrams[i].shape[1] == n])
-        index, narrow = RowIndex(listed), _narrow(listed)
-        found = [index.find(key).astype(narrow) for key in wanted]
+        own = [i for i, matrix in enumerate(ngrams) if matrix.shape[1] == n]
+        wide = [i for i, matrix in enumerate(ngrams) if matrix.shape[1] > n]
+        its = [_keys(rows[i][-1], ngrams[i][:, n - 1], size) for i in own]
+        wanted = [_keys(rows[i][-1][heads[i]], ngrams[i][heads[i], n - 1], size) for i in wide]
+        listed, places = _distinct_and_places(its)
+        below, index = index, RowIndex(listed) if n < order else None
+        found = [index.find(key) for key in wanted] if index else []
         if any((row < 0).any() for row in found):
-            listed = distinct(wanted)
-            narrow = _narrow(listed)
-            found = [np.searchsorted(listed, key).astype(narrow) for key in wanted]
+            # Mostly every prefix is an n-gram of its own: then there is less to sort.
+            listed = distinct([listed, *wanted])
+            index = RowIndex(listed)
+            found, places = [index.find(key) for key in wanted], [index.find(key) for key in its]
+        suffixes.append(_without_first(listed, size, below, suffixes[-1]))
         keys.append(listed)
+        for i, row in zip(own, places, strict=True):
+            rows[i].append(row.astype(_narrow(listed), copy=False))
         for i, row in zip(wide, found, strict=True):
-            rows[i].append(row)
-    return Trie(vocabulary, tuple(keys)), rows
+            rows[i].append(np.repeat(row.astype(_narrow(listed)), np.diff(heads[i], append=len(ngrams[i]))))
+    return Trie(vocabulary, tuple(keys), tuple(suffixes)), rows
+
+
+def _heads(ngrams: Numbers) -> Ints:
+    """Where n-grams (m, n) begin that share all but the last word, int64 (h,)."""
+    changed = np.zeros(len(ngrams), bool)
+    changed[:1] = True
+    for column in ngrams.T[:-1]:
+        changed[1:] |= column[1:] != column[:-1]
+    return np.flatnonzero(changed)
+
+
+def _keys(prefix: Numbers, word: Numbers, size: int) -> Ints:
+    keys = prefix.astype(np.int64)
+    keys *= size
+    keys += word
+    return keys
+
+
+def _distinct_and_places(parts: Sequence[Ints]) -> tuple[Ints, list[Numbers]]:
+    """The distinct numbers >= 0 of all parts, ascending, int64 (m,), and where each part's numbers are among them."""
+    numbers = np.concatenate([_NO_ROWS, *parts])
+    bits = len(numbers).bit_length()
+    if int(numbers.max(initial=0)).bit_length() + bits <= _BITS:
+        # Numbers are sorted much faster than their places: here both are one.
+        numbers <<= bits
+        numbers |= np.arange(len(numbers))
+        numbers.sort()
+        place = numbers & (1 << bits) - 1
+        numbers >>= bits
+    else:
+        place = np.argsort(numbers)
+        numbers = numbers[place]
+    new = changes(numbers)
+    rows = np.empty(len(numbers), _narrow(numbers))
+    rows[place] = np.cumsum(new, dtype=rows.dtype) - 1
+    listed = numbers if new.all() else numbers[np.flatnonzero(new)]
+    return listed, np.split(rows, np.cumsum([len(part) for part in parts[:-1]]))[: len(parts)]
 
 
 def _narrow(keys: Ints) -> type[np.signedinteger[Any]]:
@@ -209,12 +275,25 @@ def united_trie(vocabulary: Vocabulary, tries: Sequence[Trie]) -> tuple[Trie, li
     words = [vocabulary.ids(trie.vocabulary.words) for trie in tries]
     keys, rows = [np.arange(len(vocabulary))], [[word] for word in words]
     for n in range(2, max(trie.order for trie in tries) + 1):
-        # Numbers grow in the order of the text in every trie, so that each one's keys stay sorted.
         wanted = [
-            its[n - 2][trie.prefix(n)] * len(vocabulary) + word[trie.word(n)] if n <= trie.order else _NO_ROWS
+            _keys(its[n - 2][trie.prefix(n)], word[trie.word(n)], len(vocabulary)) if n <= trie.order else _NO_ROWS
             for trie, word, its in zip(tries, words, rows, strict=True)
         ]
-        keys.append(distinct(wanted))
-        for its, key in zip(rows, wanted, strict=True):
-            its.append(np.searchsorted(keys[-1], key))
-    return Trie(vocabulary, tuple(keys)), rows
+        listed, places = _distinct_and_places(wanted)
+        keys.append(listed)
+        for its, place in zip(rows, places, strict=True):
+            its.append(place.astype(np.int64))
+    known = _united_suffixes(keys, tries, rows) if all(trie.closed for trie in tries) else None
+    return Trie(vocabulary, tuple(keys), known), rows
+
+
+def _united_suffixes(keys: Sequence[Ints], tries: Sequence[Trie], rows: Sequence[Sequence[Ints]]) -> tuple[Ints, ...]:
+    """The suffixes of a trie with these keys, of which every n-gram is one of the `tries`, in these `rows`."""
+    found = [np.zeros(len(keys[0]), np.int64)]
+    for n in range(2, len(keys) + 1):
+        suffixes = np.empty(len(keys[n - 1]), np.int64)
+        for trie, its in zip(tries, rows, strict=True):
+            if n <= trie.order:
+                suffixes[its[n - 1]] = its[n - 2][trie.suffixes[n - 1]]
+        found.append(suffixes)
+    return tuple(found)

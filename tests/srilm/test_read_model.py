@@ -199,7 +199,10 @@ def test_whole_blocks_are_read_as_line_by_line(tmp_path_factory: pytest.TempPath
     for n in range(3):
         np.testing.assert_array_equal(quick.trie.keys[n], slow.trie.keys[n])
         np.testing.assert_array_equal(quick.is_context[n], slow.is_context[n])
-        np.testing.assert_array_equal(times.created[n], slow_times.created[n])
+    # The highest order has no contexts.
+    assert len(times.created) == len(slow_times.created) == 2
+    for created, slowly in zip(times.created, slow_times.created, strict=True):
+        np.testing.assert_array_equal(created, slowly)
 
 
 @settings(max_examples=100, deadline=None)

@@ -47,28 +47,43 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTi
     `expected`: the size of vocabulary that SRILM makes the model for.
     """
     vocabulary, sorted_number = reader.words.sorted()
-    blocks = [(n, block) for n, its in sorted(reader.blocks.items()) for block in its]
+    for its in reader.blocks.values():
+        its[:] = [_joined(its)]
+    blocks = [(n, block) for n, (block,) in sorted(reader.blocks.items())]
     narrow = sorted_number.astype(np.int32)
-    trie, rows = closed_trie(vocabulary, reader.order, [narrow[block.words] for _, block in blocks])
+    # Word by word, as columns lie side by side.
+    ngrams = [narrow[block.words.T].T for _, block in blocks]
+    trie, rows = closed_trie(vocabulary, reader.order, ngrams)
+    del ngrams
     names = np.array(reader.words.names(vocabulary), np.int64)
     model = MutableModel(trie, ~vocabulary.mask(reader.words.non_events), names)
     created = _weights(model, blocks, rows)
     for (n, block), row in zip(blocks, rows, strict=False):
-        kept = np.ones(len(block.lines), bool)
-        if n > 1:
-            kept = created[n - 2][row[n - 2]] <= block.lines
-            for i in np.flatnonzero(~kept).tolist():
-                line = int(block.lines[i])
-                ngram = " ".join(str(reader.words.words[word]) for word in block.words[i].tolist())
-                ngram = (reader.cased or {}).get(line, ngram)
-                message = f'{reader.name}: line {line}: warning: no bow for prefix of ngram "{ngram}"'
-                reader.said.append((line, 0, message))
-        model.stored[n - 1][row[-1][kept]] = True
+        own, log10_p = row[-1], block.log10_p
+        if n > 1 and not (kept := created[n - 2][row[n - 2]] <= block.lines).all():
+            _warn_of_dropped(reader, block, np.flatnonzero(~kept))
+            own, log10_p = own[kept], log10_p[kept]
+        model.stored[n - 1][own] = True
         # Of several values for one row the last is kept: the file's last.
-        model.log10_p[n - 1][row[-1][kept]] = block.log10_p[kept]
+        model.log10_p[n - 1][own] = log10_p
     reader.warn_of_unknown()
-    model.refresh_all()
     return model, ContextTimes(trie, created, reader.words.numbers(vocabulary), expected)
+
+
+def _joined(blocks: Sequence[Block]) -> Block:
+    """The n-grams of blocks of one order as one block."""
+    words = np.concatenate([block.words.T for block in blocks], axis=1).T
+    lines, _, log10_p, weighted, backoff, sizes = zip(*blocks, strict=True)
+    columns = [*map(np.concatenate, (lines, log10_p, weighted, backoff))]
+    return Block(columns[0], words, *columns[1:], sum(sizes))
+
+
+def _warn_of_dropped(reader: Reader, block: Block, dropped: Ints) -> None:
+    for i in dropped.tolist():
+        line = int(block.lines[i])
+        ngram = " ".join(str(reader.words.words[word]) for word in block.words[i].tolist())
+        ngram = (reader.cased or {}).get(line, ngram)
+        reader.said.append((line, 0, f'{reader.name}: line {line}: warning: no bow for prefix of ngram "{ngram}"'))
 
 
 def tables_of(model: MutableModel, words: WordList) -> ScoreTables:
@@ -91,17 +106,21 @@ def write_model(model: MutableModel, name: str, streams: Streams, debug: int, *,
 
 
 def _weights(model: MutableModel, blocks: Sequence[tuple[int, Block]], rows: Sequence[Sequence[Ints]]) -> list[Ints]:
-    """Make contexts of the n-grams with weights; per order, the line at which each row became one, int64 (m_n,)."""
+    """Make contexts of the n-grams with weights; per order below the highest, the line at which each row became one."""
     trie = model.trie
-    created = [np.full(len(keys), NEVER) for keys in trie.keys]
+    created = [np.full(len(keys), NEVER) for keys in trie.keys[:-1]]
     for (n, block), row in zip(blocks, rows, strict=False):
         if n < trie.order:
-            its, lines = row[-1][block.weighted], block.lines[block.weighted]
-            np.minimum.at(created[n - 1], its, lines)
-            model.backoff[n - 1][its] = block.backoff[block.weighted]
+            at = np.flatnonzero(block.weighted)
+            its = row[-1][at]
+            # Of several values for one row the last is kept: the first line, and the last weight.
+            created[n - 1][its[::-1]] = block.lines[at[::-1]]
+            model.backoff[n - 1][its] = block.backoff[at]
     for n in range(trie.order - 1, 0, -1):
         nodes = np.flatnonzero(created[n - 1] < NEVER)
         model.is_context[n - 1][nodes] = True
         if n > 1:
-            np.minimum.at(created[n - 2], trie.suffixes[n - 1][nodes], created[n - 1][nodes])
+            shorter = trie.suffixes[n - 1][nodes]
+            sooner = np.flatnonzero(created[n - 1][nodes] < created[n - 2][shorter])
+            np.minimum.at(created[n - 2], shorter[sooner], created[n - 1][nodes[sooner]])
     return created

@@ -23,6 +23,7 @@ _LAST = 1 << 40
 class ContextTimes:
     """When each context was put into the trie: `created` int64 (m_n,) per order beside the rows, NEVER if it was not.
 
+    It may lack the highest order, which has no contexts.
     `numbers` int64 (V,): SRILM's number of each word. `expected`: the size of vocabulary that the model was made for.
     """
 
