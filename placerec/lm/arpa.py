@@ -25,7 +25,7 @@ from placerec.files import read_lines, read_text, write_text
 from placerec.lm.arpa_text import first_lines
 from placerec.lm.backoff import BackoffModel
 from placerec.lm.logs import LOG_ZERO
-from placerec.lm.trie import Trie
+from placerec.lm.trie import Trie, changes
 from placerec.lm.vocabulary import Vocabulary
 
 log = logging.getLogger(__name__)
@@ -66,26 +66,53 @@ def row_blocks(
     sizes = (f"ngram {n}={size}\n" for n, size in enumerate(numbers, start=1))
     yield (start + "".join(sizes)).encode(encoding)
     words = trie.vocabulary.words
-    lines = first_lines(words, encoding)
-    rank = np.zeros(1, np.int64)
+    contexts = _contexts(trie, stored)
+    lines, rank = first_lines(words, encoding), np.zeros(1, np.int64)
     for n in range(1, trie.order + 1):
         yield f"\n\\{n}-grams:".encode()
-        # SRILM sorts by the context, read from its last word to its first, then by the word.
-        rows, before = _regrouped(trie.prefix(n), rank) if n > 1 else (trie.keys[0], np.zeros(len(words), np.int64))
+        rows = _wanted(trie, n, stored, contexts[n - 1])
+        before = np.zeros(len(rows), np.int64)
+        if n > 1:
+            # SRILM sorts by the context, read from its last word to its first, then by the word.
+            at, before = _regrouped(np.cumsum(changes(trie.prefix(n)[rows])) - 1, rank)
+            rows = rows[at]
+        word = _narrow(trie.word(n), len(words))[rows]
         for first in range(0, len(rows), _PART):
-            row, context = rows[first : first + _PART], before[first : first + _PART]
+            part = slice(first, first + _PART)
+            row, context, last = rows[part], before[part], word[part]
             if stored is not None and not (shown := stored[n - 1][row]).all():
-                row, context = row[shown], context[shown]
-            columns = log10_probs[n - 1][row], backoffs[n - 1][row], weighted[n - 1][row]
-            yield from lines.blocks(*columns, context, trie.keys[n - 1][row] % len(words))
+                row, context, last = row[shown], context[shown], last[shown]
+            yield from lines.blocks(log10_probs[n - 1][row], backoffs[n - 1][row], weighted[n - 1][row], context, last)
         if n < trie.order:
-            word = trie.word(n)[rows]
-            by_word = np.argsort(_narrow(word, len(words)), kind="stable")
-            lines = lines.longer(before[by_word], word[by_word])
-            rank = np.empty(len(rows), np.int64)
-            rank[rows[by_word]] = np.arange(len(rows))
+            place = np.full(len(trie.keys[n - 1]), -1)
+            place[contexts[n - 1]] = 0
+            at = np.flatnonzero(place[rows] == 0)
+            at = at[np.argsort(word[at], kind="stable")]
+            lines = lines.longer(before[at], word[at])
+            place[rows[at]] = np.arange(len(at))
+            rank = place[contexts[n - 1]]
         yield b"\n"
     yield b"\n\\end\\\n"
+
+
+def _contexts(trie: Trie, stored: Sequence[Mask] | None) -> list[Ints]:
+    """Per order, the rows int64 (c,) of what is a context of an n-gram that is written, or of such a context."""
+    contexts = [np.zeros(0, np.int64)]
+    for n in range(trie.order, 1, -1):
+        prefix = trie.prefix(n)[_wanted(trie, n, stored, contexts[-1])]
+        contexts.append(prefix[np.flatnonzero(changes(prefix))])
+    return contexts[::-1]
+
+
+def _wanted(trie: Trie, n: int, stored: Sequence[Mask] | None, contexts: Ints) -> Ints:
+    """The rows int64 (m,) of order n that are stored, and those of contexts, ascending."""
+    if stored is None:
+        return np.arange(len(trie.keys[n - 1]))
+    wanted = stored[n - 1]
+    if not wanted[contexts].all():
+        wanted = wanted.copy()
+        wanted[contexts] = True
+    return np.flatnonzero(wanted)
 
 
 def _regrouped(prefix: Ints, rank: Ints) -> tuple[Ints, Ints]:
@@ -102,7 +129,7 @@ def _regrouped(prefix: Ints, rank: Ints) -> tuple[Ints, Ints]:
 
 def _narrow(word: Ints, size: int) -> NDArray[np.integer]:
     """Numbers below `size` in a type that numpy sorts fast."""
-    return word.astype(np.uint16) if size <= 1 << 16 else word
+    return word.astype(np.uint16) if size <= 1 << 16 else word.astype(np.uint32)
 
 
 def write_arpa(model: BackoffModel, path: Path | str, *, comment: str = "") -> None:

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from placerec.arrays import Ints, Mask, Singles
+from placerec.arrays import Ints, Mask, Numbers, Singles
 from placerec.lm.logs import LOG_ZERO, shown
 
 Cells = NDArray[np.uint64]
@@ -33,7 +33,9 @@ class PlainLines:
     words: Sequence[bytes]
     contexts: Sequence[bytes]
 
-    def blocks(self, log10_p: Singles, backoff: Singles, weighted: Mask, before: Ints, word: Ints) -> Iterator[bytes]:
+    def blocks(
+        self, log10_p: Singles, backoff: Singles, weighted: Mask, before: Ints, word: Numbers
+    ) -> Iterator[bytes]:
         """Lines, each after a line end: log10 p (m,), weights (m,) where `weighted` (m,), contexts (m,), words (m,)."""
         for start in range(0, len(word), _BLOCK):
             block = slice(start, start + _BLOCK)
@@ -49,7 +51,7 @@ class PlainLines:
             )
             yield b"".join(b"%b\t%b%b%b" % line for line in fields)
 
-    def longer(self, before: Ints, word: Ints) -> "PlainLines":
+    def longer(self, before: Ints, word: Numbers) -> "PlainLines":
         """The lines of the next order, whose contexts (c,) are contexts of this one with a word added."""
         texts = zip(before.tolist(), word.tolist(), strict=True)
         return PlainLines(self.words, [b"%b%b " % (self.contexts[row], self.words[number]) for row, number in texts])
@@ -62,7 +64,9 @@ class PackedLines:
     words: Cells
     contexts: Cells
 
-    def blocks(self, log10_p: Singles, backoff: Singles, weighted: Mask, before: Ints, word: Ints) -> Iterator[bytes]:
+    def blocks(
+        self, log10_p: Singles, backoff: Singles, weighted: Mask, before: Ints, word: Numbers
+    ) -> Iterator[bytes]:
         """Lines, each after a line end: log10 p (m,), weights (m,) where `weighted` (m,), contexts (m,), words (m,)."""
         split, some_weighted = 2 + self.contexts.shape[1], bool(weighted.any())
         end = split + self.words.shape[1]
@@ -80,7 +84,7 @@ class PackedLines:
                 row[~weighted[block], end:] = 0
             yield row.tobytes().translate(None, b"\0")
 
-    def longer(self, before: Ints, word: Ints) -> "PackedLines":
+    def longer(self, before: Ints, word: Numbers) -> "PackedLines":
         """The lines of the next order, whose contexts (c,) are contexts of this one with a word added."""
         contexts = np.empty((len(word), self.contexts.shape[1] + self.words.shape[1]), _CELL)
         for start in range(0, len(word), _BLOCK):
@@ -113,14 +117,15 @@ def number_cells(values: Singles, lead: str, cells: Cells) -> None:
     """
     first, rest = _tables(lead)
     exact = values.astype(np.float64)
-    exact[np.isneginf(exact)] = LOG_ZERO
+    exact[exact == -np.inf] = LOG_ZERO
     size = np.abs(exact)
     usual = (size >= 1e-4) & (size < 99.5) | (size == 0)
     unusual = np.flatnonzero(~usual)
     size[unusual] = 0
-    place = np.zeros(len(size), np.intp)
+    above = np.zeros(len(size), np.uint8)
     for start in _STARTS:
-        place += size >= start
+        above += size >= start
+    place = above.astype(np.intp)
     units = (np.rint(size * _SEVEN[place]) * _TO_UNITS[place]).astype(np.int64)
     high = units // 10**8
     low = (units - high * 10**8).astype(np.int32)

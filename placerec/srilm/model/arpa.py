@@ -72,10 +72,16 @@ def assemble(reader: Reader, expected: int = 0) -> tuple[MutableModel, ContextTi
 
 def _joined(blocks: Sequence[Block]) -> Block:
     """The n-grams of blocks of one order as one block."""
-    words = np.concatenate([block.words.T for block in blocks], axis=1).T
-    lines, _, log10_p, weighted, backoff, sizes = zip(*blocks, strict=True)
-    columns = [*map(np.concatenate, (lines, log10_p, weighted, backoff))]
-    return Block(columns[0], words, *columns[1:], sum(sizes))
+    lines, words, log10_p, weighted, backoff, sizes = zip(*blocks, strict=True)
+    return Block(
+        np.concatenate(lines),
+        # Column by column.
+        np.concatenate([matrix.T for matrix in words], axis=1).T,
+        np.concatenate(log10_p),
+        np.concatenate(weighted),
+        np.concatenate(backoff),
+        sum(sizes),
+    )
 
 
 def _warn_of_dropped(reader: Reader, block: Block, dropped: Ints) -> None:
