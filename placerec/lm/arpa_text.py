@@ -75,22 +75,25 @@ class PackedLines:
             block = slice(start, start + _BLOCK)
             row = rows[: len(word[block])]
             number_cells(log10_p[block], "\n", row[:, :2])
-            row[:, 2:split] = self.contexts[before[block]]
-            row[:, split:end] = self.words[word[block]]
+            row[:, 2:split] = self.contexts.take(before[block], axis=0)
+            row[:, split:end] = self.words.take(word[block], axis=0)
             # In front of the first word.
             row.view(np.uint8)[:, 16] = ord("\t")
             if some_weighted:
-                number_cells(np.where(weighted[block], backoff[block], np.float32(0)), "\t", row[:, end:])
-                row[~weighted[block], end:] = 0
-            yield row.tobytes().translate(None, b"\0")
+                at = np.flatnonzero(weighted[block])
+                cells = np.empty((len(at), 2), _CELL)
+                number_cells(backoff[block][at], "\t", cells)
+                row[:, end:] = 0
+                row[at, end:] = cells
+            yield _without_nul(row)
 
     def longer(self, before: Ints, word: Numbers) -> "PackedLines":
         """The lines of the next order, whose contexts (c,) are contexts of this one with a word added."""
         contexts = np.empty((len(word), self.contexts.shape[1] + self.words.shape[1]), _CELL)
         for start in range(0, len(word), _BLOCK):
             block = slice(start, start + _BLOCK)
-            contexts[block, : self.contexts.shape[1]] = self.contexts[before[block]]
-            contexts[block, self.contexts.shape[1] :] = self.words[word[block]]
+            contexts[block, : self.contexts.shape[1]] = self.contexts.take(before[block], axis=0)
+            contexts[block, self.contexts.shape[1] :] = self.words.take(word[block], axis=0)
         return PackedLines(self.words, contexts)
 
 
@@ -102,6 +105,13 @@ def first_lines(words: Sequence[str], encoding: str) -> PlainLines | PackedLines
         return PlainLines(encoded, [b""])
     padded = np.array([b" " + word for word in encoded], f"S{-(-widest // _CELL.itemsize) * _CELL.itemsize}")
     return PackedLines(padded.view(_CELL).reshape(len(encoded), -1), np.zeros((1, 0), _CELL))
+
+
+def _without_nul(cells: Cells) -> bytes:
+    """The bytes of rows of cells, without those that fill up."""
+    text: NDArray[np.uint8] = cells.reshape(-1).view(np.uint8)
+    # Sooner than bytes.translate, where the processor guesses at every end of a word whether it is one.
+    return bytes(text.take((text != 0).nonzero()[0], mode="wrap"))
 
 
 def _printed(values: Singles, lead: str) -> list[bytes]:
@@ -131,8 +141,11 @@ def number_cells(values: Singles, lead: str, cells: Cells) -> None:
     low = (units - high * 10**8).astype(np.int32)
     middle = low // 10**4
     last = low - middle * 10**4
-    cells[:, 0] = first[high + 10**4 * (low == 0) + 2 * 10**4 * np.signbit(exact)]
-    cells[:, 1] = rest[0][middle + 10**4 * (last == 0)] | rest[1][last]
+    high += 10**4 * (low == 0)
+    high += 2 * 10**4 * np.signbit(exact)
+    middle += 10**4 * (last == 0)
+    cells[:, 0] = first.take(high)
+    cells[:, 1] = rest[0].take(middle) | rest[1].take(last)
     for i, text in zip(unusual.tolist(), _printed(values[unusual], lead), strict=True):
         cells[i] = np.frombuffer(text.ljust(16, b"\0"), _CELL)
 

@@ -11,7 +11,7 @@ _FACTOR = np.uint64(0x9E3779B97F4A7C15)
 _INVERSE = np.uint64(pow(int(_FACTOR), -1, 1 << 64))
 # Slots for each key, up to so many bits: where that is still in a cache, more room leaves fewer keys to one slot.
 _ROOM = (2, 64), (4, 19), (32, 15)
-# Keys that are put in at once: what is computed on the way stays in the processor's cache.
+# Keys that are put in, or looked up, at once: what is computed on the way stays in the processor's cache.
 _PART = 1 << 15
 
 
@@ -55,6 +55,14 @@ class RowIndex:
 
     def find(self, wanted: Ints) -> Ints:
         """The place of each of `wanted` int64 (q,), -1 where it is none of the keys; of equal keys one of them."""
+        if len(wanted) <= 4 * _PART:
+            return self._find(wanted)
+        found = np.empty(len(wanted), np.int64)
+        for start in range(0, len(found), _PART):
+            found[start : start + _PART] = self._find(wanted[start : start + _PART])
+        return found
+
+    def _find(self, wanted: Ints) -> Ints:
         slot, place = self._hashed(wanted)
         # No slot is out of range: nothing to check, nothing to wrap.
         place ^= self._slots.take(slot, mode="wrap")
