@@ -4,7 +4,7 @@ python docs/make/descriptors.py [DATA] [--set NAME ...] [--network FILE[#LAYER]]
 
 With DATA, the folder of the sets, words of every kind of descriptor that is made of images, of those of the default in
 one row and, with --network, of an image network are learned in every fold of weights.py: one dictionary of 20 x 20,
-transitions and the weight of words by what the token streams of the training tell. Tests are single frames, sequences
+transitions and the weight of words as `placerec learn` does. Tests are single frames, sequences
 as they are and in simulated light, and frames that a camera's faults or a light change. Beside these, projections of
 GIST (projections.py), and what describing costs (tests/benchmarks/descriptor_cost.py). What was done is kept in DIR, so
 that a run that was stopped goes on, and results are kept in docs/vision/. Then the tables of the page are written anew.
@@ -38,11 +38,12 @@ from placerec.evaluation.metrics import Evaluation, evaluate
 from placerec.experiments.grid.report import Table, markdown
 from placerec.files import content_digest, write_text
 from placerec.frames import Sequence as FrameSequence
+from placerec.frames.table import FrameTable
 from placerec.inspection.word_stability import word_changes
 from placerec.methods import HOHMM, make_decoder
 from placerec.model import ModelOptions, load_model
 from placerec.model.folder import ModelFolder
-from placerec.model.learn import learn_models
+from placerec.model.learn import learn_models, learn_weights_by
 from placerec.vision import (
     DEFAULT_KIND,
     KINDS,
@@ -54,6 +55,7 @@ from placerec.vision import (
     DictionarySetOptions,
     describe,
 )
+from placerec.vision.chunks import Source, chunks
 from placerec.vision.light import LIGHTS
 from placerec.vision.network import Network
 from placerec.vision.onnx import open_network
@@ -65,7 +67,7 @@ RESULTS = PAGE.with_suffix("") / "descriptors.csv"
 COSTS = RESULTS.with_name("cost.json")
 ONE_THREAD = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
 BENCHMARK = Path(__file__).parents[2] / "tests/benchmarks/descriptor_cost.py"
-DESCRIPTOR, PROJECTION = "descriptor", "projection"
+DESCRIPTOR, STABILITY, PROJECTION = "descriptor", "stability", "projection"
 SIZE, SIZES = 20, (10, 20)
 # Maps of each projection, by the seeds 0, 1, ...; descriptors have one map.
 SEEDS = 3
@@ -79,7 +81,7 @@ FIGURES = ("frames", "single", "accuracy", "log_loss", *LIGHTS, *WORDS)
 
 
 class Task(NamedTuple):
-    """Which words are judged: those of a view (DESCRIPTOR), or of a projection of GIST (PROJECTION)."""
+    """Which words are judged: those of a view (DESCRIPTOR, STABILITY), or of a projection of GIST (PROJECTION)."""
 
     about: str
     view: str
@@ -142,12 +144,29 @@ class Split:
         return describe(found, self.spec, cache=self.work / "cache")
 
 
-def judged(split: Split, dictionary: Dictionary, tests: Mapping[str, Descriptors]) -> dict[str, Evaluation]:
-    """What the filter makes of the words of some tests, by what they are called."""
+def fitted(split: Split, task: Task, frames: Descriptors) -> Dictionary:
+    """The dictionary of a task that some frames train."""
+    if task.about == PROJECTION:
+        own = frames.part(split.spec.part("gist"))
+        return learned(own, task.view, DictionaryOptions(task.size, seed=task.seed))
+    options = DictionarySetOptions((task.view,), (task.size,), seed=task.seed)
+    made = DictionarySet.fit(frames.values, spec=frames.spec, places=frames.table.places, options=options)
+    return made.dictionaries[0]
+
+
+def judged(split: Split, task: Task, dictionary: Dictionary, tests: Mapping[str, Descriptors]) -> dict[str, Evaluation]:
+    """What the filter makes of the words of some tests, by what they are called; the models are those of `learn`."""
     made, training = DictionarySet.of(dictionary), split.frames.take(~split.testing)
+    values, table, spec = training.values, training.table, training.spec
+
+    def fit(source: Source, frames: FrameTable) -> DictionarySet:
+        rows = np.concatenate([*chunks(source)])
+        return DictionarySet.of(fitted(split, task, Descriptors(spec, rows, frames)))
+
+    weigh = partial(learn_weights_by, fit, values, table, spec, 1, ModelOptions())
     with tempfile.TemporaryDirectory() as path:
         folder = ModelFolder(Path(path))
-        learn_models(folder, training.values, training.table, training.spec, made, ModelOptions())
+        learn_models(folder, values, table, spec, made, ModelOptions(), weigh)
         decoder = make_decoder(HOHMM, load_model(folder.path))
         return {
             name: evaluate([decoder.decode(stream) for stream in tokens_of(frames, made)])
@@ -155,23 +174,10 @@ def judged(split: Split, dictionary: Dictionary, tests: Mapping[str, Descriptors
         }
 
 
-def plain_figures(split: Split, dictionary: Dictionary, lights: Mapping[str, Descriptors]) -> Figures:
-    """What a dictionary does on frames as they are, one by one and filtered, and the accuracy in some lights."""
-    own = split.frames.part(dictionary.spec)
-    found = judged(split, dictionary, {"": split.frames.take(split.testing), **lights})
-    plain = found.pop("")
-    return {
-        "frames": plain.frames,
-        "single": float(np.mean(answers(dictionary, own, split.testing))),
-        "accuracy": plain.accuracy,
-        "log_loss": plain.log_loss,
-        **{light: one.accuracy for light, one in found.items()},
-    }
-
-
-def changed_words(split: Split, dictionary: Dictionary, sample: int) -> Figures:
+def changed_words(split: Split, dictionary: Dictionary) -> Figures:
     """The share of frames that get another word by each of FAULTS and LIGHTS, over all amounts of it."""
     shares: dict[str, list[float]] = {}
+    sample = CHANGED // len(FOLDS[split.name])
     for light in (False, True):
         for one in word_changes(split.sequences(), dictionary, light=light, sample=sample).results:
             name = one.amount if light else FAULTS.get(one.kind, one.kind)
@@ -180,16 +186,20 @@ def changed_words(split: Split, dictionary: Dictionary, sample: int) -> Figures:
 
 
 def figures(split: Split, task: Task) -> Figures:
-    """What the words of a task do: all of FIGURES for a descriptor, those of frames as they are for a projection."""
-    training = split.frames.take(~split.testing)
-    if task.about == PROJECTION:
-        own = training.part(split.spec.part("gist"))
-        return plain_figures(split, learned(own, task.view, DictionaryOptions(task.size, seed=task.seed)), {})
-    options = DictionarySetOptions((task.view,), (task.size,), seed=task.seed)
-    made = DictionarySet.fit(training.values, spec=training.spec, places=training.table.places, options=options)
-    (dictionary,) = made.dictionaries
-    changed = changed_words(split, dictionary, CHANGED // len(FOLDS[split.name]))
-    return plain_figures(split, dictionary, split.lights) | changed
+    """What a task asks of its words: in the filter, in simulated light but for a projection, or changed pictures."""
+    dictionary = fitted(split, task, split.frames.take(~split.testing))
+    if task.about == STABILITY:
+        return {"frames": int(split.testing.sum())} | changed_words(split, dictionary)
+    lights = {} if task.about == PROJECTION else split.lights
+    found = judged(split, task, dictionary, {"": split.frames.take(split.testing), **lights})
+    plain = found.pop("")
+    return {
+        "frames": plain.frames,
+        "single": float(np.mean(answers(dictionary, split.frames.part(dictionary.spec), split.testing))),
+        "accuracy": plain.accuracy,
+        "log_loss": plain.log_loss,
+        **{light: one.accuracy for light, one in found.items()},
+    }
 
 
 def own_figures(split: Split, task: Task) -> dict[str, Figures]:
@@ -199,10 +209,10 @@ def own_figures(split: Split, task: Task) -> dict[str, Figures]:
 
 def all_tasks(network: Network | None) -> Iterator[Task]:
     """What is done in every fold."""
-    for view in (*(f"{kind}{of}" for kind in MADE for of in ("", ":pn")), f"{DEFAULT_KIND}:pn"):
-        yield Task(DESCRIPTOR, view, SIZE, 0)
-    for view in () if network is None else ("onnx", "onnx:pn"):
-        yield Task(DESCRIPTOR, view, SIZE, 0)
+    views = [f"{kind}{of}" for kind in MADE for of in ("", ":pn")] + [f"{DEFAULT_KIND}:pn"]
+    views += [] if network is None else ["onnx", "onnx:pn"]
+    for about, view in product((DESCRIPTOR, STABILITY), views):
+        yield Task(about, view, SIZE, 0)
     for projection, size, seed in product(PROJECTIONS, SIZES, range(SEEDS)):
         yield Task(PROJECTION, projection, size, seed)
 
@@ -214,8 +224,9 @@ def run(data: Path, sets: Sequence[str], network: Network | None, work: Path) ->
         for fold, tests in enumerate(FOLDS[name]):
             split = Split(data, name, tests, spec, work)
             for task in all_tasks(network):
-                kinds = View.parse(task.view).kinds if task.about == DESCRIPTOR else ("gist",)
-                key = content_digest(*task, CHANGED, tests, spec.part(*kinds).as_dict())[:16]
+                kinds = ("gist",) if task.about == PROJECTION else View.parse(task.view).kinds
+                sample = CHANGED if task.about == STABILITY else None
+                key = content_digest(*task, sample, tests, spec.part(*kinds).as_dict())[:16]
                 found = kept(work / name / f"{key}.json", partial(own_figures, split, task))
                 yield Result(*task, name, fold, found[""])
             sys.stderr.write(f"{name}: fold {fold + 1}\n")
@@ -288,7 +299,7 @@ def of_words(results: Sequence[Result]) -> Table:
     """A line for each view: the share of frames that get another word by each fault and light, the mean over sets."""
     lines = [
         (told, *(f"{100 * of_sets(own, name)['mean']:.1f}" for name in WORDS))
-        for told, own in _grouped(results, DESCRIPTOR)
+        for told, own in _grouped(results, STABILITY)
     ]
     return (DESCRIPTOR, *(name.removesuffix(": words") for name in WORDS)), lines
 
@@ -297,7 +308,7 @@ def _grouped(results: Sequence[Result], about: str) -> Iterator[tuple[str, list[
     """What each view or projection is called, and the results of all folds and seeds."""
     own = [one for one in results if one.about == about]
     for view, size in dict.fromkeys((one.view, one.size) for one in own):
-        told = f"`{view}`" if about == DESCRIPTOR else f"{view}, {size} x {size}"
+        told = f"{view}, {size} x {size}" if about == PROJECTION else f"`{view}`"
         yield told, [one for one in own if (one.view, one.size) == (view, size)]
 
 

@@ -138,9 +138,27 @@ def learn_weights_anew(
     `values`: the descriptors of the frames in `table`, in memory or streamed. With fewer than two sequences, or where
     nothing can be learned from fewer: alpha 1 / dictionaries, memory 0.
     """
+
+    def fit(training: Source, frames: FrameTable) -> DictionarySet:
+        return DictionarySet.fit(training, spec=spec, places=frames.places, options=words, work=work)
+
+    return learn_weights_by(fit, values, table, spec, len(words.views) * len(words.sizes), options)
+
+
+def learn_weights_by(
+    fit: Callable[[Source, FrameTable], DictionarySet],
+    values: Source,
+    table: FrameTable,
+    spec: DescriptorSpec,
+    dictionaries: int,
+    options: ModelOptions,
+) -> Weights:
+    """`learn_weights_anew` for words of any making.
+
+    `fit`: learns the `dictionaries`, as many as that, from descriptors, in memory or streamed, of some frames.
+    """
     rows = table.by_sequence()
     names = list(rows)
-    dictionaries = len(words.views) * len(words.sizes)
 
     def held() -> Iterator[HeldOut]:
         for number, group in enumerate(group_borders(len(names))):
@@ -149,7 +167,7 @@ def learn_weights_anew(
             training = some_rows(values, ~left)
             others = table.take(~left)
             with _unsaid():
-                made = DictionarySet.fit(training, spec=spec, places=others.places, options=words, work=work)
+                made = fit(training, others)
             vocabularies = {one.name: one.vocabulary for one in made.dictionaries}
             counts = count_places(streams_of_rows(training, others, made, spec), vocabularies, options)
             streams = streams_of_rows(some_rows(values, left), table.take(left), made, spec)
