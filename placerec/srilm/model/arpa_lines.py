@@ -91,21 +91,34 @@ def _numbers(fields: Fields, at: Ints, *, most: float) -> Singles | None:
 
 
 _SIGN, _POINT, _BYTE = ord("-"), ord("."), np.uint64(255)
+_ZERO_POINT, _TWO_BYTES = np.uint64(int.from_bytes(b"0.", "little")), np.uint64(0xFFFF)
 
 
 def _short_decimals(fields: Fields, at: Ints) -> tuple[Floats, Mask]:
     """Numbers of one digit, a point and up to eight digits, correctly rounded; and which of the fields are that."""
     start = fields.starts[at]
-    text = fields.eights[start]
+    text = fields.eights.take(start)
     negative = text & _BYTE == _SIGN
-    start += negative
-    size = fields.lengths[at] - negative - 2
-    text >>= np.uint64(8) * negative
-    whole = (text & _BYTE) - np.uint64(ord("0"))
-    digits, plain = eight_digits(fields.eights[start + 2], FILLED.take(size, mode="clip"))
-    plain &= (whole <= 9) & (text >> np.uint64(8) & _BYTE == _POINT) & (size >= 0) & (size <= 8)
+    size = fields.lengths[at]
+    size -= 2
+    if negative.all():
+        text >>= np.uint64(8)
+        start += 3
+        size -= 1
+    else:
+        text >>= np.uint64(8) * negative
+        start += 2
+        start += negative
+        size -= negative
+    # Nothing is left of the first two bytes but the digit, if they are a digit and a point.
+    whole = (text ^ _ZERO_POINT) & _TWO_BYTES
+    digits, plain = eight_digits(fields.eights.take(start), FILLED.take(size, mode="clip"))
+    plain &= whole <= 9
+    plain &= size.view(np.uint64) <= 8
     # Both are exact, so that the quotient is the float64 nearest to the decimal number.
-    value = (whole * np.uint64(10**8) + digits) / 1e8
+    whole *= np.uint64(10**8)
+    whole += digits
+    value = whole / 1e8
     return np.where(negative, -value, value), plain
 
 
