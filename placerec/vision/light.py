@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 
 from placerec.arrays import Singles
-from placerec.errors import VisionError
+from placerec.errors import SourceError, VisionError
 from placerec.files import whole_folder
 from placerec.frames import Sequence, SourceOptions, all_images, find_sequences
 from placerec.frames.layouts import COLD_LIST, COLD_LIST_FOLDER
@@ -88,9 +88,14 @@ def _owned(out: Path) -> tuple[str, ...]:
 def relight_sequence(sequence: Sequence, folder: Path, light: str, *, seed: int) -> Iterator[bool]:
     """Write a sequence in another light to a new folder, and yield for every frame whether it could be read.
 
-    `relit_sequence` is what it then is. Raises VisionError for an unknown light.
+    `relit_sequence` is what it then is. Raises VisionError for an unknown light, and SourceError for two frames that
+    would be one file.
     """
     _check(light)
+    names = [_name(frame, number) for number, frame in enumerate(sequence.frames)]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise SourceError(f"{sequence.source}: two frames would both be stored as {twice}; rename one")
     labels = []
     (folder / CAMERA).mkdir(parents=True)
     (folder / COLD_LIST_FOLDER).mkdir()
@@ -99,7 +104,7 @@ def relight_sequence(sequence: Sequence, folder: Path, light: str, *, seed: int)
             log.warning("%s; the frame is left out", image)
             yield False
             continue
-        name = _name(frame, number)
+        name = names[number]
         stored = relit_jpeg(image, light, seed=seed, sequence=sequence.name, frame=number)
         (folder / CAMERA / name).write_bytes(stored)
         if frame.place:

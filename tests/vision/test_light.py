@@ -10,7 +10,7 @@ from helpers.small_world import write_images
 from helpers.typed_commands import done, fails
 
 from placerec.cli import commands
-from placerec.errors import OutputError, VisionError
+from placerec.errors import OutputError, SourceError, VisionError
 from placerec.frames import find_sequences, read_gray
 from placerec.vision.light import LIGHTS, relight, relight_sequence, relit, relit_sequence
 
@@ -110,3 +110,12 @@ def test_the_command_offers_every_light() -> None:
     (light,) = [one for one in commands.commands["relight"].params if one.name == "light"]
     assert isinstance(light.type, click.Choice)
     assert [*light.type.choices] == [*LIGHTS]
+
+
+def test_two_frames_that_would_be_one_file_are_refused(tmp_path: Path) -> None:
+    run = write_images(tmp_path / "run", 1, 2)
+    first, second, *_ = sorted(run.rglob("*.png"))
+    second.rename(first.with_suffix(".jpg"))
+    with pytest.raises(SourceError, match=rf"run: two frames would both be stored as {first.stem}\.jpeg; rename one"):
+        relight([run], tmp_path / "out", "warm")
+    assert not (tmp_path / "out").exists()
