@@ -41,7 +41,8 @@ from placerec.frames import Sequence as FrameSequence
 from placerec.frames.table import FrameTable
 from placerec.inspection.word_stability import word_changes
 from placerec.methods import HOHMM, make_decoder
-from placerec.model import ModelOptions, load_model
+from placerec.model import Decoding, ModelOptions, load_model
+from placerec.model.decoding import AS_LEARNED
 from placerec.model.folder import ModelFolder
 from placerec.model.learn import learn_models, learn_weights_by
 from placerec.vision import (
@@ -70,14 +71,16 @@ BENCHMARK = Path(__file__).parents[2] / "tests/benchmarks/descriptor_cost.py"
 DESCRIPTOR, STABILITY, PROJECTION = "descriptor", "stability", "projection"
 SIZE, SIZES = 20, (10, 20)
 # Maps of each projection, by the seeds 0, 1, ...; descriptors have one map.
-SEEDS = 3
+SEEDS = 2
 # Frames of a set that a camera's faults and lights change.
 CHANGED = 60
+# Words that count in full against what the learned transitions predict.
+UNWEIGHED = Decoding(transition="learned", alpha=1.0, memory=0.0)
 MADE = [kind for kind, one in KINDS.items() if one.describe is not None and kind != "onnx"]
 # What is changed about a frame whose word is looked at, of `placerec stability`, and by which name it is shown.
 FAULTS = {"JPEG": "JPEG", "noise": "noise", "blur": "blur", "shift by 1 pixel": "shift"}
 WORDS = [f"{name}: words" for name in (*FAULTS.values(), *LIGHTS)]
-FIGURES = ("frames", "single", "accuracy", "log_loss", *LIGHTS, *WORDS)
+FIGURES = ("frames", "single", "unweighed", "accuracy", "log_loss", *LIGHTS, *WORDS)
 
 
 class Task(NamedTuple):
@@ -155,7 +158,10 @@ def fitted(split: Split, task: Task, frames: Descriptors) -> Dictionary:
 
 
 def judged(split: Split, task: Task, dictionary: Dictionary, tests: Mapping[str, Descriptors]) -> dict[str, Evaluation]:
-    """What the filter makes of the words of some tests, by what they are called; the models are those of `learn`."""
+    """What the filter makes of the words of some tests, by what they are called; the models are those of `learn`.
+
+    Words of the tests "unweighed" count in full.
+    """
     made, training = DictionarySet.of(dictionary), split.frames.take(~split.testing)
     values, table, spec = training.values, training.table, training.spec
 
@@ -167,11 +173,12 @@ def judged(split: Split, task: Task, dictionary: Dictionary, tests: Mapping[str,
     with tempfile.TemporaryDirectory() as path:
         folder = ModelFolder(Path(path))
         learn_models(folder, values, table, spec, made, ModelOptions(), weigh)
-        decoder = make_decoder(HOHMM, load_model(folder.path))
-        return {
-            name: evaluate([decoder.decode(stream) for stream in tokens_of(frames, made)])
-            for name, frames in tests.items()
-        }
+        models = load_model(folder.path)
+        found = {}
+        for name, frames in tests.items():
+            decoder = make_decoder(HOHMM, models, options=UNWEIGHED if name == "unweighed" else AS_LEARNED)
+            found[name] = evaluate([decoder.decode(stream) for stream in tokens_of(frames, made)])
+        return found
 
 
 def changed_words(split: Split, dictionary: Dictionary) -> Figures:
@@ -191,7 +198,8 @@ def figures(split: Split, task: Task) -> Figures:
     if task.about == STABILITY:
         return {"frames": int(split.testing.sum())} | changed_words(split, dictionary)
     lights = {} if task.about == PROJECTION else split.lights
-    found = judged(split, task, dictionary, {"": split.frames.take(split.testing), **lights})
+    tests = split.frames.take(split.testing)
+    found = judged(split, task, dictionary, {"": tests, "unweighed": tests, **lights})
     plain = found.pop("")
     return {
         "frames": plain.frames,
@@ -225,8 +233,8 @@ def run(data: Path, sets: Sequence[str], network: Network | None, work: Path) ->
             split = Split(data, name, tests, spec, work)
             for task in all_tasks(network):
                 kinds = ("gist",) if task.about == PROJECTION else View.parse(task.view).kinds
-                sample = CHANGED if task.about == STABILITY else None
-                key = content_digest(*task, sample, tests, spec.part(*kinds).as_dict())[:16]
+                asked = CHANGED if task.about == STABILITY else FIGURES[:5]
+                key = content_digest(*task, asked, tests, spec.part(*kinds).as_dict())[:16]
                 found = kept(work / name / f"{key}.json", partial(own_figures, split, task))
                 yield Result(*task, name, fold, found[""])
             sys.stderr.write(f"{name}: fold {fold + 1}\n")
@@ -271,13 +279,17 @@ def of_sets(results: Sequence[Result], figure: str) -> dict[str, float]:
 
 
 def by_set(results: Sequence[Result], about: str) -> Table:
-    """A line for each view and size: single frames, accuracy and log loss on each set, and their means over sets."""
+    """A line for each view and size: accuracies and log loss on each set, and their means over sets.
+
+    Of single frames, of the filter with words that count in full, and with what they weigh by training.
+    """
     lines = []
     head: list[str] = []
     for told, own in _grouped(results, about):
-        single, right, loss = (of_sets(own, figure) for figure in ("single", "accuracy", "log_loss"))
-        head = [*single]
-        cells = [f"{100 * single[name]:.1f} / {100 * right[name]:.1f}, {loss[name]:.3f}" for name in head]
+        shares = [of_sets(own, figure) for figure in ("single", "unweighed", "accuracy")]
+        loss = of_sets(own, "log_loss")
+        head = [*loss]
+        cells = [" / ".join(f"{100 * one[name]:.1f}" for one in shares) + f", {loss[name]:.3f}" for name in head]
         lines.append((told, *cells))
     return (about, *head), lines
 

@@ -108,7 +108,7 @@ def test_means_are_over_frames_in_a_set_then_over_sets(program: ModuleType) -> N
     results = [result("gist", first, 0, 30, 0.5), result("gist", first, 1, 10, 0.9), result("gist", second, 0, 7, 0.8)]
     head, lines = program.by_set(results, "descriptor")
     assert head == ("descriptor", first, second, "mean")
-    assert lines == [("`gist`", "60.0 / 60.0, 0.600", "80.0 / 80.0, 0.800", "70.0 / 70.0, 0.700")]
+    assert lines == [("`gist`", "60.0 / 60.0 / 60.0, 0.600", "80.0 / 80.0 / 80.0, 0.800", "70.0 / 70.0 / 70.0, 0.700")]
     head, lines = program.in_light(results)
     assert head == ("descriptor", "as it is", "dim", "warm", "lamp", "exposure")
     assert lines == [("`gist`", "70.0", "68.8 (-2.5)", *["70.0 (+0.0)"] * 3)]
