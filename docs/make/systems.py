@@ -52,17 +52,7 @@ MEANS = tuple(name for name in MethodScore.__annotations__ if name not in ("meth
 # The sets whose mean is told, the peers that are on every view there, and what the page calls these views.
 SUMMARY = ("go2home", "ietower", "multifloor", "rtabmap_corridor")
 PEERS = ("ullah2008", "ullah2008-hmm", "knn", "logistic", "logistic-hmm", "rbf-svm", "rbf-svm-hmm")
-VIEWS = {
-    **{
-        "gist": PLAIN,
-        "gist:pn": NORMALISED,
-        "lbp": "lbp",
-        "lbp:pn": "lbp:pn",
-        "ranks": "ranks",
-        "ranks:pn": "ranks:pn",
-    },
-    "all views": ALL,
-}
+VIEWS = {"gist": PLAIN, "gist:pn": NORMALISED, "lbp:pn": "lbp:pn", "ranks:pn": "ranks:pn", "all views": ALL}
 
 
 def on(peer: str, view: str) -> str:

@@ -27,7 +27,7 @@ def program(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_peers_are_on_every_view_with_names_that_compare_knows(program: ModuleType) -> None:
     assert check_methods(program.METHODS) == [*program.METHODS]
     assert {*DEFAULT} < {*program.METHODS}
-    assert {"knn@lbp", "rbf-svm-hmm@tuned", "logistic-hmm@ranks:pn-tuned", "ullah2008@views"} < {*program.METHODS}
+    assert {"knn@lbp:pn", "rbf-svm-hmm@tuned", "logistic-hmm@ranks:pn-tuned", "ullah2008@views"} < {*program.METHODS}
     assert next(name for name in DEFAULT if not program.draws(name)) == "ullah2008"
     assert program.draws("hohmm")
     assert program.draws("torralba2003@pn-tuned")
@@ -60,7 +60,7 @@ def test_the_command_writes_tables_between_the_marks_of_a_page(tmp_path: Path) -
 def test_the_summary_is_the_mean_over_sets(program: ModuleType, tmp_path: Path) -> None:
     for name, figures in (("a", "0.9,0.1,0.4"), ("b", "0.8,0.3,0.2")):
         (tmp_path / name).mkdir()
-        lines = [f"{method},{figures}" for method in ("hohmm", "knn@views", "rbf-svm-hmm@lbp-tuned")]
+        lines = [f"{method},{figures}" for method in ("hohmm", "knn@views", "rbf-svm-hmm@lbp:pn-tuned")]
         text = "\n".join(["method,accuracy,ece,log_loss", *lines, ""])
         (tmp_path / name / "methods.csv").write_text(text, encoding="utf-8")
     _, _, *rows = program.summary([tmp_path / "a", tmp_path / "b"]).splitlines()
