@@ -176,9 +176,9 @@ def summary(folders: Sequence[Path]) -> str:
         right, ece, loss = means[name]
         return f"{100 * right:.1f}, {ece:.3f}, {loss:.2f}"
 
-    lines = [(f"`{HOHMM}`", *[""] * (len(VIEWS) - 1), cell(HOHMM))]
-    for peer in PEERS:
-        lines.append((f"`{on(peer, PLAIN)}`", *(cell(on(peer, view)) for view in VIEWS.values())))
+    of_views = {HOHMM: {ALL: HOHMM}, **{name: {PLAIN: name} for name in (f"{HOHMM}-single", f"{HOHMM}-paper")}}
+    of_views |= {on(peer, PLAIN): {view: on(peer, view) for view in VIEWS.values()} for peer in PEERS}
+    lines = [(f"`{name}`", *(cell(names.get(view, "")) for view in VIEWS.values())) for name, names in of_views.items()]
     return markdown((("method", *VIEWS), lines))
 
 
