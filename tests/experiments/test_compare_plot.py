@@ -55,3 +55,27 @@ def test_methods_that_cannot_be_told_from_the_best_are_marked(tmp_path: Path) ->
     assert found.not_told_from_best() == {"knn", "hohmm"}
     plot_comparison(found, tmp_path / "one.svg")
     assert MARKED in drawn_texts(tmp_path / "one.svg")
+
+
+def test_long_names_make_room_for_themselves(tmp_path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    drawn: list[float] = []
+
+    def left_of_names(figure: Figure) -> float:
+        renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+        labels = figure.axes[0].get_yticklabels()
+        return float(min(label.get_window_extent(renderer).x0 for label in labels))
+
+    saved = Figure.savefig
+
+    def savefig(figure: Figure, *args: object, **options: object) -> None:
+        saved(figure, *args, **options)  # type: ignore[arg-type]
+        drawn.append(left_of_names(figure))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", savefig)
+        for name in ("hohmm", "ullah2008-hmm@views-tuned", "ullah2008-hmm@gist+lbp+ranks:half-tuned"):
+            plot_comparison(comparison(score(name, 0.9, 12.0)), tmp_path / "one.png")
+    assert len(drawn) == 3
+    assert min(drawn) > 0

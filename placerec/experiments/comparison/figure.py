@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 # Inches.
 _WIDTH, _ROW, _HEAD, _FOOT = 10.0, 0.235, 1.12, 1.35
 _NAMES, _ACCURACY, _SHARES, _COST = 1.65, 4.6, 0.75, 2.2
+# What a letter of a name takes; long names make the figure wider.
+_LETTER = 0.08
 # The least cost that is drawn, in microseconds.
 _LEAST_COST = 0.1
 _SHADE, _SOFT = "0.945", "0.35"
@@ -34,9 +36,10 @@ def plot_comparison(found: Comparison, path: Path | str) -> None:
     """
     scores = [score for score in found.best_first() if score.method != "majority"]
     rows = max(len(scores), 1)
-    with figure_file(path, _WIDTH, _HEAD + _ROW * rows + _FOOT) as figure:
+    names = max([_NAMES, *(_LETTER * len(score.method) for score in scores)])
+    with figure_file(path, _WIDTH + names - _NAMES, _HEAD + _ROW * rows + _FOOT) as figure:
         write_line(figure, 0.4, f"Accuracy on {found.frames} test frames, and cost", 13)
-        left = MARGIN + _NAMES
+        left = MARGIN + names
         accuracy = panel(figure, left, _HEAD, _ACCURACY, _ROW * rows)
         cost = panel(figure, left + _ACCURACY + _SHARES, _HEAD, _COST, _ROW * rows)
         equals = found.not_told_from_best() if found.pairs else set()
@@ -47,7 +50,7 @@ def plot_comparison(found: Comparison, path: Path | str) -> None:
             label.set_fontweight("bold" if score.method in equals else "normal")
         _accuracy(accuracy, found, scores, equals)
         _cost(cost, scores, equals)
-        _legend(figure, scores, bool(equals))
+        _legend(figure, scores, left, bool(equals))
         for line, text in enumerate(_caption(found)):
             write_line(figure, _HEAD + _ROW * rows + 0.8 + 0.17 * line, text, 7.5, "0.3")
 
@@ -123,7 +126,7 @@ def _paint(score: MethodScore, equals: set[str]) -> dict[str, Any]:
     }
 
 
-def _legend(figure: "Figure", scores: Sequence[MethodScore], told: bool) -> None:
+def _legend(figure: "Figure", scores: Sequence[MethodScore], left: float, told: bool) -> None:
     """What colours and filled dots mean, above the rows."""
     from matplotlib.lines import Line2D
 
@@ -137,10 +140,10 @@ def _legend(figure: "Figure", scores: Sequence[MethodScore], told: bool) -> None
     ]
     width, height = figure.get_size_inches()
     at = {"frameon": False, "fontsize": 8, "title_fontsize": 8, "alignment": "left", "borderaxespad": 0}
-    placed = ("the method sees", dots, (MARGIN + _NAMES, 0.52)), ("its accuracy is", marks if told else [], (5.1, 0.12))
-    for title, handles, (left, top) in placed:
+    placed = ("the method sees", dots, (left, 0.52)), ("its accuracy is", marks if told else [], (5.1, 0.12))
+    for title, handles, (right, top) in placed:
         if handles:
-            spot = (left / width, 1 - top / height)
+            spot = (right / width, 1 - top / height)
             columns = len(handles)
             legend = figure.legend(
                 handles=handles, title=title, loc="upper left", bbox_to_anchor=spot, ncols=columns, **at
