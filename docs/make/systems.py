@@ -47,7 +47,7 @@ from placerec.frames import find_sequences
 from placerec.hohmm import read_beliefs
 from placerec.methods import HOHMM
 
-SEEDS, SPLIT = 3, "leave-one-out"
+SEEDS, SPLIT = 5, "leave-one-out"
 MEANS = tuple(name for name in MethodScore.__annotations__ if name not in ("method", "accuracy_low", "accuracy_high"))
 # The sets whose mean is told, the peers that are on every view there, and what the page calls these views.
 SUMMARY = ("go2home", "ietower", "multifloor", "rtabmap_corridor")

@@ -68,3 +68,22 @@ def test_the_summary_is_the_mean_over_sets(program: ModuleType, tmp_path: Path) 
     assert cells["| `hohmm`"][-1] == "85.0, 0.200, 0.30"
     assert cells["| `knn`"][-1] == "85.0, 0.200, 0.30"
     assert sum("85.0" in row for row in rows) == 3
+
+
+def test_the_tables_of_the_page_are_those_of_the_files(program: ModuleType) -> None:
+    page = (DOCS / "systems.md").read_text(encoding="utf-8")
+    tables = {slot[2]: slot[3] for slot in importlib.import_module("experiment_page").SLOT.finditer(page)}
+    assert tables.pop("summary") == program.summary([DOCS / "systems" / name for name in program.SUMMARY])
+    assert {*program.SUMMARY} < {*tables} == {path.name for path in (DOCS / "systems").iterdir()}
+    for name, table in tables.items():
+        with (DOCS / "systems" / name / "methods.csv").open(encoding="utf-8", newline="") as file:
+            scores = {row["method"]: row for row in csv.DictReader(file)}
+        rows = [line.strip("| ").split(" | ") for line in table.splitlines() if line.startswith("| `")]
+        assert len(rows) > 40
+        assert scores.keys() == {*program.METHODS}
+        for method, right, *_, ece, loss, _ in rows:
+            row = scores[method.split("`")[1]]
+            # The file's six digits were rounded before.
+            assert float(right) == pytest.approx(100 * float(row["accuracy"]), abs=0.0502)
+            assert float(ece) == pytest.approx(float(row["ece"]), abs=0.000502)
+            assert float(loss) == pytest.approx(float(row["log_loss"]), abs=0.00502)
