@@ -21,8 +21,8 @@ ALPHAS = (1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.09, 0.06, 0.04, 0.03, 0.
 MEMORIES = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0)
 # No belief is smaller for the log loss, as in `placerec.evaluation`: one frame must not decide alone.
 _SMALLEST_BELIEF = 1e-15
-# Of two groups, both are easily better without a view by chance.
-LEAST_GROUPS = 3
+# So many groups are all better without a view by chance in less than one case of twenty.
+LEAST_GROUPS = 5
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from helpers.small_world import write_images
 
 from placerec import learn
 from placerec.errors import ModelError, VisionError
+from placerec.hohmm.weights import LEAST_GROUPS
 from placerec.learning import format_learned
 from placerec.methods import decode
 from placerec.model import ModelOptions, load_model, train_lm
@@ -32,11 +33,14 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-@pytest.mark.parametrize(("sequences", "views"), [(2, 4), (3, 3)])
-def test_it_writes_what_the_single_commands_write(tmp_path: Path, runs: list[Path], sequences: int, views: int) -> None:
-    training = runs[:sequences]
+@pytest.mark.parametrize(("least", "views"), [(LEAST_GROUPS, 4), (3, 3)])
+def test_it_writes_what_the_single_commands_write(
+    tmp_path: Path, runs: list[Path], monkeypatch: pytest.MonkeyPatch, least: int, views: int
+) -> None:
+    monkeypatch.setattr("placerec.hohmm.weights.LEAST_GROUPS", least)
+    training = runs[:3]
     found = learn(training, tmp_path / "model", words=WORDS)
-    # Only of three groups of sequences can a view be left out.
+    # Of three sequences each is a group.
     assert len(found.dictionaries.options.views) == views
     words = replace(WORDS, views=found.dictionaries.options.views)
     describe_sources(training, tmp_path / "descriptors.npz", spec=DescriptorSpec(kind=words.kind()))
