@@ -57,7 +57,7 @@ class Weights:
         """The view without which least log loss is left, if every group of LEAST_GROUPS or more has less without it.
 
         A view that is worth little where it is judged may be worth much in another building: least log loss alone
-        leaves out too much (docs/vision.md).
+        leaves out too much (docs/recognizer.md).
         """
         bad = [
             (one.without, name)
